@@ -91,6 +91,68 @@ fn nuts_are_joined_to_their_bolts_unless_they_are_named_as_apart() {
     assert!(joined(&apart).iter().all(|joint| joint["parts"] != serde_json::json!(["bolt-1", "nut-1"])));
 }
 
+/// By state, the number of parts that have to be held.
+fn hands(states: &Value) -> Vec<usize> {
+    let held = |unstable: &Value| unstable["hold"][0].as_array().unwrap().len();
+    let of = |state: &Value| state["unstable"].as_array().unwrap().iter().map(held).sum();
+    states.as_array().unwrap().iter().map(of).collect()
+}
+
+#[test]
+fn a_bolt_follows_its_nut_where_it_would_have_to_be_held() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let found = sbdp(folder.path(), arguments);
+        assert!(found.status.success(), "{found:?}");
+        found.stdout
+    };
+    let bracket = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/assemblies/bolted-bracket-20");
+    run(&["plan", bracket, "--embedded", "-q", "--json", "plan.json"]);
+    let read = |text: &[u8]| serde_json::from_slice::<Value>(text).unwrap();
+    // Upside down, so that bolts hang by their nuts.
+    let statics = ["--up=-z", "--json", "-"];
+    let before = read(&run(&[&["statics", "plan.json"][..], &statics].concat()));
+    let after = read(&run(&[&["statics", "plan.json", "--reorder", "steady.json"][..], &statics].concat()));
+    let most = |document: &Value| hands(&document["states"]).into_iter().max().unwrap();
+    assert!(most(&after) < most(&before), "{} before, {} after", most(&before), most(&after));
+    // The states are those of the new plan, which has the same steps, each after those that it requires.
+    assert_eq!(read(&run(&[&["statics", "steady.json"][..], &statics].concat())), after);
+    let [plan, steady] =
+        ["plan.json", "steady.json"].map(|file| read(&fs::read(folder.path().join(file)).unwrap()));
+    let paths = |plan: &Value| {
+        let mut steps: Vec<String> =
+            plan["steps"].as_array().unwrap().iter().map(|step| step["path"].to_string()).collect();
+        steps.sort();
+        steps
+    };
+    assert_eq!(paths(&plan), paths(&steady));
+    let names = |plan: &Value, step: usize| plan["steps"][step]["parts"].to_string();
+    let required = |plan: &Value| {
+        let mut all: Vec<(String, Vec<String>)> = Vec::new();
+        for (i, step) in plan["steps"].as_array().unwrap().iter().enumerate() {
+            let before: Vec<usize> =
+                step["requires"].as_array().unwrap().iter().map(|r| r.as_u64().unwrap() as usize).collect();
+            assert!(before.iter().all(|&r| r < i), "step {i} requires {before:?}");
+            let mut before: Vec<String> = before.iter().map(|&r| names(plan, r)).collect();
+            before.sort();
+            all.push((names(plan, i), before));
+        }
+        all.sort();
+        all
+    };
+    assert_eq!(required(&plan), required(&steady));
+}
+
+#[test]
+fn plans_whose_order_is_fixed_are_not_reordered() {
+    let folder = tempfile::tempdir().unwrap();
+    states(folder.path(), &counterweight(), &["--base", "table", "--assembly"], &[]);
+    let refused = sbdp(folder.path(), &["statics", "plan.json", "--reorder", "steady.json"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("plan the disassembly"), "{refused:?}");
+    assert!(!folder.path().join("steady.json").exists());
+}
+
 #[test]
 fn an_assembly_plan_has_the_states_of_the_disassembly_backwards() {
     let folder = tempfile::tempdir().unwrap();

@@ -12,11 +12,11 @@ use super::error::CliError;
 use super::subject::Subject;
 use super::table::TextTable;
 use super::{STDOUT, interrupt, print, written};
-use crate::document::{Placements, PlanDocument, StepDocument};
+use crate::document::{Placements, PlanDocument, StepDocument, reordered};
 use crate::geometry::{Pose, pose_from_waypoint};
 use crate::plan::{PlanKind, StepEnd};
 use crate::search::Termination;
-use crate::service::{JointKind, StandingState, StaticsQuery};
+use crate::service::{JointKind, OrderedStep, StandingState, StaticsQuery};
 use crate::statics::{Stability, StaticsOptions};
 use crate::view::{Up, kind_of};
 
@@ -74,24 +74,38 @@ pub(super) fn run(arguments: &StaticsArguments) -> Result<ExitCode, CliError> {
     };
     let options =
         StaticsOptions { up, friction: arguments.friction, gap: arguments.gap, margin: arguments.margin };
-    let plan = &subject.plan;
-    let stays = stays(plan, &arguments.stays)?;
+    let mut plan = subject.plan.clone();
+    let stays = stays(&plan, &arguments.stays)?;
     let termination = Termination::default();
     interrupt::cancel_on_interrupt(&termination.cancel_flag())?;
-    let query = StaticsQuery {
+    let mut query = StaticsQuery {
         options,
-        states: states(plan, &stays)?,
-        screwed: screwed(plan),
-        join: pairs(plan, "--join", &arguments.join)?,
-        apart: pairs(plan, "--apart", &arguments.apart)?,
+        states: states(&plan, &stays)?,
+        screwed: screwed(&plan),
+        join: pairs(&plan, "--join", &arguments.join)?,
+        apart: pairs(&plan, "--apart", &arguments.apart)?,
     };
     let (service, id) = subject.admitted()?;
     let assembly = service.assembly(id)?;
     if assembly.parts.iter().map(|part| &part.name).ne(&plan.parts) {
         return Err(CliError::Refused("the assembly has other parts than the plan".to_owned()));
     }
-    let answer = service.statics(id, &query, &termination)?;
-    let answer = answer.ok_or_else(|| CliError::Failed("interrupted".to_owned()))?;
+    let interrupted = || CliError::Failed("interrupted".to_owned());
+    if let Some(file) = &arguments.reorder {
+        let steps = ordered_steps(&plan)?;
+        let order = service.steady_order(id, &query, &steps, &termination)?.ok_or_else(interrupted)?;
+        if order.len() < plan.steps.len() {
+            let reason = "--reorder: steps of the plan require each other, or some that it does not have";
+            return Err(CliError::Refused(reason.to_owned()));
+        }
+        plan = reordered(&plan, &order);
+        let text =
+            plan.to_json().map_err(|e| CliError::Failed(format!("cannot write the plan as JSON: {e}")))?;
+        written(file, format!("{text}\n").as_bytes())?;
+        query.states = states(&plan, &stays)?;
+    }
+    let plan = &plan;
+    let answer = service.statics(id, &query, &termination)?.ok_or_else(interrupted)?;
     let name = |part: usize| plan.parts.get(part).map_or("?", String::as_str);
     let document = StaticsDocument {
         schema: SCHEMA,
@@ -174,6 +188,38 @@ fn screwed(plan: &PlanDocument) -> BTreeSet<usize> {
     let steps = plan.steps.iter().filter(turned);
     let number = |name: &String| plan.parts.iter().position(|part| part == name);
     steps.flat_map(|step| &step.parts).filter_map(number).collect()
+}
+
+/// The steps as far as the order among them goes.
+fn ordered_steps(plan: &PlanDocument) -> Result<Vec<OrderedStep>, CliError> {
+    let refused = |reason: &str| Err(CliError::Refused(format!("--reorder: {reason}")));
+    if kind_of(plan) == PlanKind::Assembly {
+        return refused(
+            "parts of an assembly plan wait for their turn in the way of others; plan the disassembly",
+        );
+    }
+    if plan.steps.iter().any(|step| step.ends == StepEnd::Aside.name()) {
+        return refused("the plan moves parts aside, where they are in the way of others");
+    }
+    let number = |name: &String| plan.parts.iter().position(|part| part == name);
+    let ordered = |(i, step): (usize, &StepDocument)| {
+        let parts: Vec<usize> = step.parts.iter().filter_map(number).collect();
+        let requires = step.requires.iter().copied();
+        match (step.of, &parts[..]) {
+            // How a group lies matters to its own parts alone, which keep their order.
+            (Some(_), _) => {
+                let siblings = (0..i).filter(|&other| plan.steps[other].of == step.of);
+                OrderedStep { parts: Vec::new(), requires: requires.chain(siblings).collect(), end: None }
+            }
+            (None, [_]) => {
+                let end = step.path.last().map(pose_from_waypoint);
+                OrderedStep { requires: requires.collect(), end, parts }
+            }
+            // A group is out where it ends once all is gone that goes before it.
+            (None, _) => OrderedStep { requires: (0..i).collect(), end: None, parts },
+        }
+    };
+    Ok(plan.steps.iter().enumerate().map(ordered).collect())
 }
 
 /// The states of what stands in the assembly: at first, and after each step.

@@ -32,18 +32,18 @@ use crate::geometry::{
     healed_assembly, recent_sources, remember_healed, source_of,
 };
 use crate::plan::{Overlap, Plan, Warning};
-use crate::scene::{HullStore, JoinedHulls};
+use crate::scene::{HullStore, JoinedHulls, Scene};
 use crate::sdf::{FieldStore, keep_field, keep_rest_of_field};
 use crate::search::{Engine, PlanRequest, PlanSink, Staging, axes_of, least_travel};
 use crate::simulation::{Action, Axis, PenaltyParameters};
-use crate::termination::Termination;
+use crate::termination::{Interrupt, Termination};
 
 use entry::{Entry, engine_of};
 use pools::Pools;
 pub use records::RECORD_KINDS;
 pub(crate) use records::{AnsweredQuestion, recent_answers, remember_answer, remembered_answer};
 use relay::Discard;
-pub use statics::{JointKind, StandingState, StaticsAnswer, StaticsQuery};
+pub use statics::{JointKind, OrderedStep, StandingState, StaticsAnswer, StaticsQuery};
 use store::AssemblyStore;
 pub use store::StoreStatistics;
 
@@ -401,6 +401,37 @@ impl Service {
         query: &StaticsQuery,
         termination: &Termination,
     ) -> Result<Option<StaticsAnswer>, ServiceError> {
+        self.with_scene(id, query, termination, |assembly, scene| {
+            statics::answer(assembly, scene, query, termination)
+        })
+    }
+
+    /// An order of the steps of a disassembly in which few parts have to be held at once, as numbers of the steps: by the
+    /// first state of a query, from which the steps lead on, and in which no part is moved aside. Steps that require each
+    /// other, or what is not there, are left out.
+    ///
+    /// # Errors
+    /// As of [`Self::statics`].
+    pub fn steady_order(
+        &self,
+        id: AssemblyId,
+        query: &StaticsQuery,
+        steps: &[OrderedStep],
+        termination: &Termination,
+    ) -> Result<Option<Vec<usize>>, ServiceError> {
+        self.with_scene(id, query, termination, |assembly, scene| {
+            statics::steady_order(assembly, scene, query, steps, termination)
+        })
+    }
+
+    /// An answer about the scene of an assembly that has all parts of a query.
+    fn with_scene<T>(
+        &self,
+        id: AssemblyId,
+        query: &StaticsQuery,
+        termination: &Termination,
+        answer: impl FnOnce(&Assembly, &Scene) -> Result<T, Interrupt>,
+    ) -> Result<Option<T>, ServiceError> {
         let entry = self.entry(id, termination)?;
         let count = entry.assembly.parts.len();
         check_parts(&[("screwed", query.screwed.iter().copied().collect())], count)?;
@@ -411,8 +442,7 @@ impl Service {
         }
         let cache = RequestCache::of(Arc::clone(&self.cache));
         let Ok((prepared, _)) = entry.prepared(termination, &cache) else { return Ok(None) };
-        let (assembly, scene) = (&entry.assembly, &prepared.scene);
-        Ok(statics::answer(assembly, scene, query, termination).ok())
+        Ok(answer(&entry.assembly, &prepared.scene).ok())
     }
 
     /// The blocking graphs of the assembled state along some axes, both ways each, without the `removed` parts

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::fasteners::Fastener;
 use crate::geometry::{Assembly, Pose};
-use crate::scene::Scene;
+use crate::scene::{Scene, StandingParts, exit_direction};
 use crate::simulation::NullTwist;
 use crate::statics::{Stability, Statics, StaticsOptions};
 use crate::termination::{Interrupt, Termination};
@@ -35,6 +35,18 @@ pub struct StaticsQuery {
     pub join: Vec<[usize; 2]>,
     /// Pairs that are not.
     pub apart: Vec<[usize; 2]>,
+}
+
+/// A step of a plan, as far as the order among the steps goes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OrderedStep {
+    /// The parts that it takes out of the assembly; none if it takes a group apart that is out.
+    pub parts: Vec<usize>,
+    /// The numbers of the steps that come before it.
+    pub requires: Vec<usize>,
+    /// Of a single part that has to end apart from the hull of all that stands, the motion (input frame) from its assembled
+    /// pose to where it ends.
+    pub end: Option<Pose>,
 }
 
 /// The answer to a [`StaticsQuery`].
@@ -77,8 +89,7 @@ pub(super) fn answer(
     let StaticsQuery { options, states, .. } = query;
     let mut answer =
         StaticsAnswer { joints: BTreeMap::new(), states: vec![Stability::default(); states.len()] };
-    let fasteners: Vec<Option<Fastener>> =
-        assembly.shapes.par_iter().map(|shape| Fastener::of(&shape.surface)).collect();
+    let fasteners = fasteners(assembly);
     // They share what is found about their contacts.
     let mut places: Vec<SamePlaces> = Vec::new();
     for (i, state) in states.iter().enumerate() {
@@ -111,6 +122,71 @@ pub(super) fn answer(
         answer.joints.extend(joints);
     }
     Ok(answer)
+}
+
+/// An order of steps in which few parts have to be held at once: the first step that needs no more hands than the state
+/// before it, those first that take out what has to be held; where there is none, a step that needs the fewest.
+///
+/// A part has to end apart from the hull of all that stands then, which it does from its place in the plan on.
+pub(super) fn steady_order(
+    assembly: &Assembly,
+    scene: &Scene,
+    query: &StaticsQuery,
+    steps: &[OrderedStep],
+    termination: &Termination,
+) -> Result<Vec<usize>, Interrupt> {
+    let Some(first) = query.states.first() else { return Ok((0..steps.len()).collect()) };
+    let fasteners = fasteners(assembly);
+    let fastener = |part: usize| fasteners[assembly.parts[part].shape].as_ref();
+    let joined = joints(scene, query, fastener, |_| true, termination)?.into_keys().collect();
+    let mut statics = Statics::of(scene, assembly, &query.options, joined, termination)?;
+    let mut standing: Vec<usize> = first.parts.iter().map(|(part, _)| *part).collect();
+    let mut state = statics.stability(&standing, &first.stays, termination)?;
+    let mut order = Vec::with_capacity(steps.len());
+    while order.len() < steps.len() {
+        let is_ready = |number: &usize| {
+            !order.contains(number) && steps[*number].requires.iter().all(|before| order.contains(before))
+        };
+        let mut ready: Vec<usize> = (0..steps.len()).filter(is_ready).collect();
+        let falls =
+            |part: &usize| state.unstable.iter().flat_map(|u| &u.falls).any(|fall| fall.part == *part);
+        ready.sort_by_key(|&number| !steps[number].parts.iter().any(falls));
+        let mut best: Option<(usize, Vec<usize>, Stability)> = None;
+        for number in ready {
+            let OrderedStep { parts, end, .. } = &steps[number];
+            let rest: Vec<usize> = standing.iter().copied().filter(|part| !parts.contains(part)).collect();
+            if let (Some(end), &[part]) = (end, &parts[..])
+                && !is_out(scene, &rest, part, &scaled(end, assembly.scale))
+            {
+                continue;
+            }
+            let found = statics.stability(&rest, &first.stays, termination)?;
+            let is_steady = found.trouble() <= state.trouble();
+            if best.as_ref().is_none_or(|(.., least)| found.trouble() < least.trouble()) {
+                best = Some((number, rest, found));
+            }
+            if is_steady {
+                break;
+            }
+        }
+        // What is left waits for each other.
+        let Some((number, rest, found)) = best else { break };
+        order.push(number);
+        (standing, state) = (rest, found);
+    }
+    Ok(order)
+}
+
+/// Whether the hull of a part, moved from its assembled pose (planning frame), is apart from that of what stands.
+fn is_out(scene: &Scene, standing: &[usize], part: usize, motion: &Pose) -> bool {
+    let pose = motion * scene.bodies[part].planning_from_shape;
+    standing.is_empty()
+        || exit_direction(scene, &StandingParts::new(scene, standing.to_vec()), part, &pose, None).is_some()
+}
+
+/// The fastener of each shape, if it is one.
+fn fasteners(assembly: &Assembly) -> Vec<Option<Fastener>> {
+    assembly.shapes.par_iter().map(|shape| Fastener::of(&shape.surface)).collect()
 }
 
 /// The pairs that are joined as the parts stand.

@@ -73,6 +73,12 @@ impl Stability {
         self.unstable.is_empty() && self.unknown.is_empty()
     }
 
+    /// The number of parts that have to be held at once, or are not known to stand.
+    #[must_use]
+    pub fn trouble(&self) -> usize {
+        self.hands() + self.unknown.len()
+    }
+
     /// The number of parts that have to be held at once.
     #[must_use]
     pub fn hands(&self) -> usize {

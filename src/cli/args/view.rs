@@ -95,6 +95,10 @@ pub(in crate::cli) struct StaticsArguments {
     /// Also find out how much of the weight may act sideways until something falls; it takes many times as long
     #[arg(long)]
     pub(in crate::cli) margin: bool,
+    /// Put the steps into an order in which fewer parts have to be held at once, and write that plan to this file. Only for
+    /// disassemblies in which no part is moved aside
+    #[arg(long, value_name = "FILE")]
+    pub(in crate::cli) reorder: Option<PathBuf>,
     /// Write the states as JSON to this file (`-`: to stdout, instead of the table)
     #[arg(long, value_name = "FILE")]
     pub(in crate::cli) json: Option<PathBuf>,
