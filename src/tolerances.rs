@@ -523,6 +523,10 @@ pub(crate) const FRICTION_ROOM: f64 = 1.02;
 
 // Fasteners.
 
+/// Multiple of the distance of the flats that a nut, a screw's head and its shank are wide at most, about their line: flange
+/// nuts have 1.4 of it (ISO 4161), heads 2.8 of their socket (ISO 7380), up to 3.3 countersunk (ISO 10642). At half, these are
+/// none; at double, a plate with a hexagonal boss is a nut.
+pub(crate) const WIDEST_FASTENER: [f64; 2] = [2.2, 4.0];
 /// Share of a part's surface that a flat of a hexagon has at least: of a screw M8 that is 200 long, one flat of the socket
 /// has 0.002. At half, longer screws are known; at double, screws of 15 diameters and more are none. Time goes with the
 /// square of the number of such flats.

@@ -355,7 +355,7 @@ fn fall(unstable: &UnstableDocument<'_>) -> String {
 
 /// A few names, and how many there are besides.
 fn listed(names: &[&str]) -> String {
-    /// More fill the line.
+    /// Count of names. At half, pairs look like many; at double, the table is wider than most terminals.
     const NAMED: usize = 3;
     match names.get(..NAMED) {
         Some(few) if names.len() > NAMED => format!("{} and {} more", few.join(", "), names.len() - NAMED),

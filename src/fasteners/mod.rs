@@ -13,7 +13,9 @@ mod round_faces;
 use nalgebra::{Point3, Unit, Vector3};
 
 use crate::geometry::{Pose, Surface};
-use crate::tolerances::{LEAST_ENGAGEMENT, ROD_OF_NUT, TAPPED_HOLE, THREAD_OF_HEXAGON, THREAD_OF_SOCKET};
+use crate::tolerances::{
+    LEAST_ENGAGEMENT, ROD_OF_NUT, TAPPED_HOLE, THREAD_OF_HEXAGON, THREAD_OF_SOCKET, WIDEST_FASTENER,
+};
 
 use hexagons::{Hexagon, hexagons};
 use round_faces::{RoundFace, round_faces};
@@ -82,7 +84,12 @@ impl Fastener {
     /// The fastener that has a surface, if it is one.
     #[must_use]
     pub fn of(surface: &Surface) -> Option<Self> {
-        hexagons(surface).into_iter().find_map(|hexagon| {
+        let widest =
+            |hexagon: &Hexagon| WIDEST_FASTENER[usize::from(hexagon.is_socket)] * hexagon.across_flats / 2.0;
+        let is_head = |hexagon: &Hexagon| {
+            surface.vertices().iter().all(|p| hexagon.line.to(p).norm() <= widest(hexagon))
+        };
+        hexagons(surface).into_iter().filter(is_head).find_map(|hexagon| {
             let rounds = round_faces(surface, &hexagon.line);
             let found = nut(&hexagon, &rounds).or_else(|| screw(&hexagon, &rounds));
             found.map(|(kind, thread)| {

@@ -105,6 +105,15 @@ fn nuts_and_screws_have_the_sizes_of_their_standards_wherever_they_stand() {
         // M8 by ISO 4032, 4014, 4762 and 4026; M3 and M36.
         is(of(nut(13.0, 4.2, 6.8)).as_ref(), FastenerKind::Nut, Drive::Hexagon, 13.0, 8.4);
         is(of(nut(5.5, 1.5, 2.4)).as_ref(), FastenerKind::Nut, Drive::Hexagon, 5.5, 3.0);
+        let flange = turned(&[
+            (Ring::Round(4.2), 0.0),
+            (Ring::Round(8.9), 0.0),
+            (Ring::Round(8.9), 2.0),
+            (Ring::Hexagon(13.0), 2.0),
+            (Ring::Hexagon(13.0), 8.0),
+            (Ring::Round(4.2), 8.0),
+        ]);
+        is(of(flange).as_ref(), FastenerKind::Nut, Drive::Hexagon, 13.0, 8.4);
         is(of(nut(55.0, 18.0, 31.0)).as_ref(), FastenerKind::Nut, Drive::Hexagon, 55.0, 36.0);
         let screw = of(hexagon_screw(13.0, 4.0, 5.3, 40.0));
         is(screw.as_ref(), FastenerKind::Screw, Drive::Hexagon, 13.0, 8.0);
@@ -131,6 +140,15 @@ fn what_has_no_hexagon_of_the_size_of_a_thread_is_no_fastener() {
         turned(&[(Round(0.0), 0.0), (Hexagon(13.0), 0.0), (Hexagon(13.0), 50.0), (Round(0.0), 50.0)]),
         nut(13.0, 6.0, 6.8),
         nut(100.0, 4.0, 6.8),
+        // A flange with a hexagonal boss.
+        turned(&[
+            (Round(4.2), 0.0),
+            (Round(20.0), 0.0),
+            (Round(20.0), 5.0),
+            (Hexagon(13.0), 5.0),
+            (Hexagon(13.0), 12.0),
+            (Round(4.2), 12.0),
+        ]),
         turned(&[(Hexagon(13.0), 0.0), (Round(20.0), 0.0), (Round(20.0), 5.0), (Hexagon(13.0), 5.0)]),
         teeth,
     ];
