@@ -70,6 +70,7 @@ mod lru;
 pub mod plan;
 mod rrt;
 pub mod scene;
+pub mod schedule;
 pub mod sdf;
 pub mod search;
 pub mod service;

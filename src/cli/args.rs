@@ -14,6 +14,7 @@ mod bench;
 mod input;
 mod load;
 mod poses;
+mod standing;
 mod through_daemon;
 mod view;
 
@@ -23,8 +24,9 @@ pub(super) use bench::{BenchArguments, BenchCommand, BenchReport, BenchRun, Benc
 pub(super) use input::Input;
 pub(super) use load::{BenchCancel, BenchLoad, BenchLoadClient, BenchSoak};
 pub(super) use poses::placed;
+pub(super) use standing::{ScheduleArguments, StandingArguments, StaticsArguments};
 pub(super) use through_daemon::{BenchChurn, BenchLatency, BenchRawPeer, BenchReplan, BenchRestart};
-pub(super) use view::{GraphArguments, StaticsArguments, StepsArguments, ViewArguments};
+pub(super) use view::{GraphArguments, StepsArguments, ViewArguments};
 
 /// Plans how assemblies come apart.
 #[derive(Debug, Parser)]
@@ -61,6 +63,8 @@ pub(super) enum Command {
     Steps(StepsArguments),
     /// Say after each step of a plan what stands by itself, what needs friction, and what has to be held
     Statics(StaticsArguments),
+    /// Say when which arm carries out which step of a plan, and what it holds
+    Schedule(ScheduleArguments),
     /// Show the state of the running daemon
     Status(super::status::StatusArguments),
     /// Check a configuration of the daemon

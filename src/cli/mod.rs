@@ -1,7 +1,7 @@
 //! The command line `sbdp`.
 //!
 //! `plan` asks the daemon if one runs, else a service in this process; `check` always works
-//! here; `view`, `graph`, `steps` and `statics` show; `cache` looks after the store on disk; `bench` runs `plan` in processes of its own. Results go to stdout; progress, warnings about the way there and errors to stderr.
+//! here; `view`, `graph`, `steps`, `statics` and `schedule` show; `cache` looks after the store on disk; `bench` runs `plan` in processes of its own. Results go to stdout; progress, warnings about the way there and errors to stderr.
 
 mod args;
 mod backend;
@@ -21,7 +21,9 @@ mod part_names;
 mod plan;
 mod progress;
 mod report;
+mod schedule;
 mod staging;
+mod standing;
 mod statics;
 mod status;
 mod steps;
@@ -52,6 +54,7 @@ pub fn run() -> ExitCode {
         Command::Graph(arguments) => graph::run(&arguments),
         Command::Steps(arguments) => steps::run(&arguments),
         Command::Statics(arguments) => statics::run(&arguments),
+        Command::Schedule(arguments) => schedule::run(&arguments),
         Command::Status(arguments) => status::run(&arguments),
         Command::Config(arguments) => config::run(&arguments),
         Command::Cache(arguments) => cache::run(&arguments),

@@ -1,24 +1,20 @@
 //! `sbdp statics`: what stands by itself after each step of a plan, and what has to be held.
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::ExitCode;
 
-use nalgebra::{Unit, Vector3};
 use serde::Serialize;
 
 use super::args::StaticsArguments;
 use super::error::CliError;
-use super::subject::Subject;
+use super::standing::{StandingPlan, check_order_is_free};
 use super::table::TextTable;
 use super::{STDOUT, interrupt, print, written};
-use crate::document::{Placements, PlanDocument, StepDocument, reordered};
-use crate::geometry::{Pose, pose_from_waypoint};
-use crate::plan::{PlanKind, StepEnd};
+use crate::document::{PlanDocument, StepDocument};
+use crate::geometry::pose_from_waypoint;
 use crate::search::Termination;
-use crate::service::{JointKind, OrderedStep, StandingState, StaticsQuery};
-use crate::statics::{Stability, StaticsOptions};
-use crate::view::{Up, kind_of};
+use crate::service::{JointKind, OrderedStep, StandingState};
+use crate::statics::Stability;
 
 /// The version of the document.
 const SCHEMA: &str = "sbdp-statics/1";
@@ -66,52 +62,31 @@ struct FallDocument<'a> {
 }
 
 pub(super) fn run(arguments: &StaticsArguments) -> Result<ExitCode, CliError> {
-    let subject = Subject::read(&arguments.plan, arguments.meshes.as_deref())?;
-    let up = match (arguments.up, subject.up()) {
-        (Some(up), _) => Unit::new_normalize(Vector3::from(up)),
-        (None, Up::Y) => Vector3::y_axis(),
-        (None, Up::Z) => Vector3::z_axis(),
-    };
-    let options =
-        StaticsOptions { up, friction: arguments.friction, gap: arguments.gap, margin: arguments.margin };
-    let mut plan = subject.plan.clone();
-    let stays = stays(&plan, &arguments.stays)?;
+    let mut asked = StandingPlan::read(&arguments.standing, arguments.margin)?;
     let termination = Termination::default();
     interrupt::cancel_on_interrupt(&termination.cancel_flag())?;
-    let mut query = StaticsQuery {
-        options,
-        states: states(&plan, &stays)?,
-        screwed: screwed(&plan),
-        join: pairs(&plan, "--join", &arguments.join)?,
-        apart: pairs(&plan, "--apart", &arguments.apart)?,
-    };
-    let (service, id) = subject.admitted()?;
-    let assembly = service.assembly(id)?;
-    if assembly.parts.iter().map(|part| &part.name).ne(&plan.parts) {
-        return Err(CliError::Refused("the assembly has other parts than the plan".to_owned()));
-    }
     let interrupted = || CliError::Failed("interrupted".to_owned());
     if let Some(file) = &arguments.reorder {
-        let steps = ordered_steps(&plan)?;
-        let order = service.steady_order(id, &query, &steps, &termination)?.ok_or_else(interrupted)?;
-        if order.len() < plan.steps.len() {
+        let steps = ordered_steps(&asked.plan)?;
+        let StandingPlan { service, id, query, .. } = &asked;
+        let order = service.steady_order(*id, query, &steps, &termination)?.ok_or_else(interrupted)?;
+        if order.len() < asked.plan.steps.len() {
             let reason = "--reorder: steps of the plan require each other, or some that it does not have";
             return Err(CliError::Refused(reason.to_owned()));
         }
-        plan = reordered(&plan, &order);
-        let text =
-            plan.to_json().map_err(|e| CliError::Failed(format!("cannot write the plan as JSON: {e}")))?;
+        asked.reorder(&order)?;
+        let text = asked.plan.to_json();
+        let text = text.map_err(|e| CliError::Failed(format!("cannot write the plan as JSON: {e}")))?;
         written(file, format!("{text}\n").as_bytes())?;
-        query.states = states(&plan, &stays)?;
     }
-    let plan = &plan;
-    let answer = service.statics(id, &query, &termination)?.ok_or_else(interrupted)?;
+    let StandingPlan { plan, stays, service, id, query } = &asked;
+    let answer = service.statics(*id, query, &termination)?.ok_or_else(interrupted)?;
     let name = |part: usize| plan.parts.get(part).map_or("?", String::as_str);
     let document = StaticsDocument {
         schema: SCHEMA,
-        up: up.into_inner().into(),
+        up: query.options.up.into_inner().into(),
         friction: query.options.friction,
-        stays: &stays,
+        stays,
         joined: answer
             .joints
             .iter()
@@ -139,16 +114,6 @@ pub(super) fn run(arguments: &StaticsArguments) -> Result<ExitCode, CliError> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Pairs of parts that an option names.
-fn pairs(plan: &PlanDocument, option: &str, named: &[String]) -> Result<Vec<[usize; 2]>, CliError> {
-    let number = |name: &String| {
-        let number = plan.parts.iter().position(|part| part == name);
-        number.ok_or_else(|| CliError::Refused(format!("{option}: the plan has no part `{name}`")))
-    };
-    let pair = |pair: &[String; 2]| Ok([number(&pair[0])?, number(&pair[1])?]);
-    named.as_chunks().0.iter().map(pair).collect()
-}
-
 fn reason(kind: JointKind) -> &'static str {
     match kind {
         JointKind::Named => "named",
@@ -158,49 +123,9 @@ fn reason(kind: JointKind) -> &'static str {
     }
 }
 
-/// What stays: as named, or as the plan has it.
-fn stays(plan: &PlanDocument, named: &[String]) -> Result<Vec<String>, CliError> {
-    if let Some(unknown) = named.iter().find(|name| !plan.parts.contains(name)) {
-        return Err(CliError::Refused(format!("--stays: the plan has no part `{unknown}`")));
-    }
-    let stays: Vec<String> = match named {
-        [] => {
-            plan.parts.iter().filter(|p| plan.fixed.contains(p) || plan.base.contains(p)).cloned().collect()
-        }
-        named => named.to_vec(),
-    };
-    if stays.is_empty() {
-        let reason = "the plan has neither a base nor fixed parts; name what stays with --stays";
-        return Err(CliError::Refused(reason.to_owned()));
-    }
-    Ok(stays)
-}
-
-/// The parts that a step turns by more than half a turn: threads, as far as their contacts show one.
-fn screwed(plan: &PlanDocument) -> BTreeSet<usize> {
-    let turned = |step: &&StepDocument| {
-        let turns = step.path.windows(2).map(|pair| {
-            let [from, to] = [&pair[0], &pair[1]].map(pose_from_waypoint);
-            from.rotation.angle_to(&to.rotation)
-        });
-        turns.sum::<f64>() > std::f64::consts::PI
-    };
-    let steps = plan.steps.iter().filter(turned);
-    let number = |name: &String| plan.parts.iter().position(|part| part == name);
-    steps.flat_map(|step| &step.parts).filter_map(number).collect()
-}
-
 /// The steps as far as the order among them goes.
 fn ordered_steps(plan: &PlanDocument) -> Result<Vec<OrderedStep>, CliError> {
-    let refused = |reason: &str| Err(CliError::Refused(format!("--reorder: {reason}")));
-    if kind_of(plan) == PlanKind::Assembly {
-        return refused(
-            "parts of an assembly plan wait for their turn in the way of others; plan the disassembly",
-        );
-    }
-    if plan.steps.iter().any(|step| step.ends == StepEnd::Aside.name()) {
-        return refused("the plan moves parts aside, where they are in the way of others");
-    }
+    check_order_is_free(plan, "--reorder")?;
     let number = |name: &String| plan.parts.iter().position(|part| part == name);
     let ordered = |(i, step): (usize, &StepDocument)| {
         let parts: Vec<usize> = step.parts.iter().filter_map(number).collect();
@@ -220,48 +145,6 @@ fn ordered_steps(plan: &PlanDocument) -> Result<Vec<OrderedStep>, CliError> {
         }
     };
     Ok(plan.steps.iter().enumerate().map(ordered).collect())
-}
-
-/// The states of what stands in the assembly: at first, and after each step.
-fn states(plan: &PlanDocument, stays: &[String]) -> Result<Vec<StandingState>, CliError> {
-    let kind = kind_of(plan);
-    let placements = Placements::new(kind, plan).map_err(CliError::Refused)?;
-    let number = |name: &String| plan.parts.iter().position(|part| part == name);
-    let mut standing: BTreeMap<usize, Pose> = (0..plan.parts.len()).map(|p| (p, Pose::identity())).collect();
-    plan.initial.removed.iter().filter_map(number).for_each(|part| _ = standing.remove(&part));
-    let stays: Vec<usize> = stays.iter().filter_map(number).collect();
-    let state = |standing: &BTreeMap<usize, Pose>| StandingState {
-        parts: standing.iter().map(|(part, pose)| (*part, *pose)).collect(),
-        stays: stays.clone(),
-    };
-    let mut states = vec![state(&standing)];
-    for turn in 0..plan.steps.len() {
-        // An assembly plan is walked backwards.
-        let step = match kind {
-            PlanKind::Disassembly => turn,
-            PlanKind::Assembly => plan.steps.len() - 1 - turn,
-        };
-        let (step, frame) = (&plan.steps[step], &placements.steps[step]);
-        if step.of.is_none() {
-            let far = match kind {
-                PlanKind::Disassembly => step.path.last(),
-                PlanKind::Assembly => step.path.first(),
-            };
-            let far = far.map(pose_from_waypoint).unwrap_or_default();
-            for (name, pose) in step.parts.iter().zip(&frame.standing) {
-                let Some(part) = number(name) else { continue };
-                match frame.ends {
-                    StepEnd::Aside => _ = standing.insert(part, far * pose),
-                    StepEnd::Out | StepEnd::In => _ = standing.remove(&part),
-                }
-            }
-        }
-        states.push(state(&standing));
-    }
-    if kind == PlanKind::Assembly {
-        states.reverse();
-    }
-    Ok(states)
 }
 
 fn described<'a>(

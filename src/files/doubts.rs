@@ -2,6 +2,7 @@
 
 use nalgebra::Point3;
 
+use super::units::metres;
 use crate::geometry::{Bounds, SourceAssembly, SourceMesh};
 
 /// Metres. A longer assembly is likely in another unit: a ship is not. At half, large ships are doubted.
@@ -43,13 +44,7 @@ pub(super) fn doubts(assembly: &SourceAssembly) -> Vec<String> {
 fn size(longest: f64, units: Option<&str>) -> Option<String> {
     // Without a unit, most files are in millimetres; the doubt says so.
     let (unit, metres) = match units {
-        Some("m") => ("m", 1.0),
-        Some("cm") => ("cm", 1e-2),
-        Some("in") => ("in", 0.0254),
-        Some("ft") => ("ft", 0.3048),
-        Some("µm") => ("µm", 1e-6),
-        Some("mm") => ("mm", 1e-3),
-        Some(_) => return None,
+        Some(unit) => (unit, metres(unit)?),
         None => ("mm (no unit is given)", 1e-3),
     };
     let length = longest * metres;

@@ -41,6 +41,7 @@ pub use self::natural_order::natural_order;
 pub use self::options::{IgnorePattern, LoadOptions, Split};
 pub use self::step::StepSettings;
 pub(crate) use self::step::forget as forget_converted;
+pub(crate) use self::units::metres;
 
 /// Reads an assembly with default options; see [`load`].
 ///

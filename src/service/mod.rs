@@ -43,7 +43,7 @@ use pools::Pools;
 pub use records::RECORD_KINDS;
 pub(crate) use records::{AnsweredQuestion, recent_answers, remember_answer, remembered_answer};
 use relay::Discard;
-pub use statics::{JointKind, OrderedStep, StandingState, StaticsAnswer, StaticsQuery};
+pub use statics::{JointKind, OrderedStep, StandingSession, StandingState, StaticsAnswer, StaticsQuery};
 use store::AssemblyStore;
 pub use store::StoreStatistics;
 
@@ -421,6 +421,23 @@ impl Service {
     ) -> Result<Option<Vec<usize>>, ServiceError> {
         self.with_scene(id, query, termination, |assembly, scene| {
             statics::steady_order(assembly, scene, query, steps, termination)
+        })
+    }
+
+    /// Asks how parts stand in one state after another: what stays is that of the first state of a query, and no part is
+    /// moved aside.
+    ///
+    /// # Errors
+    /// As of [`Self::statics`].
+    pub fn with_standing<T>(
+        &self,
+        id: AssemblyId,
+        query: &StaticsQuery,
+        termination: &Termination,
+        ask: impl FnOnce(&mut StandingSession<'_>) -> T,
+    ) -> Result<Option<T>, ServiceError> {
+        self.with_scene(id, query, termination, |assembly, scene| {
+            Ok(ask(&mut StandingSession::new(assembly, scene, query, termination)?))
         })
     }
 

@@ -124,6 +124,39 @@ pub(super) fn answer(
     Ok(answer)
 }
 
+/// How parts stand in states that are asked for one after the other. No part is moved aside.
+#[derive(Debug)]
+pub struct StandingSession<'a> {
+    statics: Statics<'a>,
+    stays: &'a [usize],
+    termination: &'a Termination,
+}
+
+impl<'a> StandingSession<'a> {
+    /// With what stays in the first state of a query.
+    pub(super) fn new(
+        assembly: &Assembly,
+        scene: &'a Scene,
+        query: &'a StaticsQuery,
+        termination: &'a Termination,
+    ) -> Result<Self, Interrupt> {
+        let fasteners = fasteners(assembly);
+        let fastener = |part: usize| fasteners[assembly.parts[part].shape].as_ref();
+        let joined = joints(scene, query, fastener, |_| true, termination)?.into_keys().collect();
+        let statics = Statics::of(scene, assembly, &query.options, joined, termination)?;
+        let stays = query.states.first().map_or(&[][..], |state| &state.stays);
+        Ok(Self { statics, stays, termination })
+    }
+
+    /// How the parts that stand (ascending) are held.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub fn stability(&mut self, standing: &[usize]) -> Result<Stability, Interrupt> {
+        self.statics.stability(standing, self.stays, self.termination)
+    }
+}
+
 /// An order of steps in which few parts have to be held at once: the first step that needs no more hands than the state
 /// before it, those first that take out what has to be held; where there is none, a step that needs the fewest.
 ///
@@ -135,22 +168,18 @@ pub(super) fn steady_order(
     steps: &[OrderedStep],
     termination: &Termination,
 ) -> Result<Vec<usize>, Interrupt> {
-    let Some(first) = query.states.first() else { return Ok((0..steps.len()).collect()) };
-    let fasteners = fasteners(assembly);
-    let fastener = |part: usize| fasteners[assembly.parts[part].shape].as_ref();
-    let joined = joints(scene, query, fastener, |_| true, termination)?.into_keys().collect();
-    let mut statics = Statics::of(scene, assembly, &query.options, joined, termination)?;
-    let mut standing: Vec<usize> = first.parts.iter().map(|(part, _)| *part).collect();
-    let mut state = statics.stability(&standing, &first.stays, termination)?;
+    let mut session = StandingSession::new(assembly, scene, query, termination)?;
+    let first = query.states.first().into_iter().flat_map(|state| &state.parts);
+    let mut standing: Vec<usize> = first.map(|(part, _)| *part).collect();
+    let mut state = session.stability(&standing)?;
     let mut order = Vec::with_capacity(steps.len());
     while order.len() < steps.len() {
         let is_ready = |number: &usize| {
             !order.contains(number) && steps[*number].requires.iter().all(|before| order.contains(before))
         };
         let mut ready: Vec<usize> = (0..steps.len()).filter(is_ready).collect();
-        let falls =
-            |part: &usize| state.unstable.iter().flat_map(|u| &u.falls).any(|fall| fall.part == *part);
-        ready.sort_by_key(|&number| !steps[number].parts.iter().any(falls));
+        let falling = state.falling();
+        ready.sort_by_key(|&number| !steps[number].parts.iter().any(|part| falling.contains(part)));
         let mut best: Option<(usize, Vec<usize>, Stability)> = None;
         for number in ready {
             let OrderedStep { parts, end, .. } = &steps[number];
@@ -160,7 +189,7 @@ pub(super) fn steady_order(
             {
                 continue;
             }
-            let found = statics.stability(&rest, &first.stays, termination)?;
+            let found = session.stability(&rest)?;
             let is_steady = found.trouble() <= state.trouble();
             if best.as_ref().is_none_or(|(.., least)| found.trouble() < least.trouble()) {
                 best = Some((number, rest, found));

@@ -73,6 +73,12 @@ impl Stability {
         self.unstable.is_empty() && self.unknown.is_empty()
     }
 
+    /// The parts that fall.
+    #[must_use]
+    pub fn falling(&self) -> Vec<usize> {
+        self.unstable.iter().flat_map(|unstable| unstable.falls.iter().map(|fall| fall.part)).collect()
+    }
+
     /// The number of parts that have to be held at once, or are not known to stand.
     #[must_use]
     pub fn trouble(&self) -> usize {
