@@ -71,7 +71,7 @@ fn times_come_from_a_file() {
     let folder = bracket(&["--target", "bolt-1"]);
     fs::write(folder.path().join("times.toml"), "grasp = 10\nput_down = 20.5\nspeed = 1e9\nturn = 0\n")
         .unwrap();
-    let found = scheduled(folder.path(), &["--times", "times.toml", "--arms", "1"]);
+    let found = scheduled(folder.path(), &["--times", "times.toml", "--arms", "1", "--weightless"]);
     let steps = found["steps"].as_array().unwrap().len();
     assert!((found["seconds"].as_f64().unwrap() - 30.5 * steps as f64).abs() < 1e-3, "{found}");
     for (text, words) in [
