@@ -79,6 +79,19 @@ fn print(text: &str) -> Result<(), CliError> {
     }
 }
 
+/// Writes a document as indented JSON to a file, or to stdout where the file is `-`. Returns whether it went to stdout.
+fn written_as_json(file: &Path, document: &impl serde::Serialize, what: &str) -> Result<bool, CliError> {
+    let text = serde_json::to_string_pretty(document)
+        .map_err(|e| CliError::Failed(format!("cannot write the {what} as JSON: {e}")))?;
+    let is_stdout = file == Path::new(STDOUT);
+    if is_stdout {
+        print(&format!("{text}\n"))?
+    } else {
+        written(file, text.as_bytes())?
+    }
+    Ok(is_stdout)
+}
+
 /// Writes a file whole.
 fn written(file: &Path, bytes: &[u8]) -> Result<(), CliError> {
     std::fs::write(file, bytes).map_err(|e| CliError::Failed(format!("{}: {e}", file.display())))

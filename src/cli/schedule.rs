@@ -10,7 +10,7 @@ use super::args::ScheduleArguments;
 use super::error::CliError;
 use super::standing::{StandingPlan, check_order_is_free};
 use super::table::TextTable;
-use super::{STDOUT, interrupt, print, written};
+use super::{interrupt, print, written_as_json};
 use crate::document::{PlanDocument, StepDocument};
 use crate::files::metres;
 use crate::geometry::{Assembly, Bounds, Pose, interpolate, pose_from_waypoint, transformed};
@@ -84,14 +84,10 @@ pub(super) fn run(arguments: &ScheduleArguments) -> Result<ExitCode, CliError> {
         }
     };
     let document = document(&plan, &found, &operations, arms, times);
-    if let Some(file) = &arguments.json {
-        let text = serde_json::to_string_pretty(&document)
-            .map_err(|e| CliError::Failed(format!("cannot write the schedule as JSON: {e}")))?;
-        if file == Path::new(STDOUT) {
-            print(&format!("{text}\n"))?;
-            return Ok(ExitCode::SUCCESS);
-        }
-        written(file, text.as_bytes())?;
+    if let Some(file) = &arguments.json
+        && written_as_json(file, &document, "schedule")?
+    {
+        return Ok(ExitCode::SUCCESS);
     }
     print(&table(&document, &plan))?;
     Ok(ExitCode::SUCCESS)

@@ -14,7 +14,7 @@ use crate::service::{AssemblyId, Service, StandingState, StaticsQuery};
 use crate::statics::StaticsOptions;
 use crate::view::{Up, kind_of};
 
-/// A plan, its assembly, and what is asked about how it stands.
+/// A plan with its assembly, and the query about its states.
 pub(super) struct StandingPlan {
     pub(super) plan: PlanDocument,
     /// The names of what stays.

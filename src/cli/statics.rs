@@ -1,6 +1,5 @@
 //! `sbdp statics`: what stands by itself after each step of a plan, and what has to be held.
 
-use std::path::Path;
 use std::process::ExitCode;
 
 use serde::Serialize;
@@ -9,7 +8,7 @@ use super::args::StaticsArguments;
 use super::error::CliError;
 use super::standing::{StandingPlan, check_order_is_free};
 use super::table::TextTable;
-use super::{STDOUT, interrupt, print, written};
+use super::{interrupt, print, written, written_as_json};
 use crate::document::{PlanDocument, StepDocument};
 use crate::geometry::pose_from_waypoint;
 use crate::search::Termination;
@@ -100,14 +99,10 @@ pub(super) fn run(arguments: &StaticsArguments) -> Result<ExitCode, CliError> {
             .map(|(after, (state, found))| described(after, state, found, name))
             .collect(),
     };
-    if let Some(file) = &arguments.json {
-        let text = serde_json::to_string_pretty(&document)
-            .map_err(|e| CliError::Failed(format!("cannot write the states as JSON: {e}")))?;
-        if file == Path::new(STDOUT) {
-            print(&format!("{text}\n"))?;
-            return Ok(ExitCode::SUCCESS);
-        }
-        written(file, text.as_bytes())?;
+    if let Some(file) = &arguments.json
+        && written_as_json(file, &document, "states")?
+    {
+        return Ok(ExitCode::SUCCESS);
     }
     print(&table(plan, &document))?;
     print(&format!("\n{}\n", hands(&answer.states)))?;
