@@ -446,6 +446,16 @@ pub(crate) const HOLDING_SETS: usize = 200;
 /// much; at double, 1.08 instead of 1.08².
 pub(crate) const SIDEWAYS_DIRECTIONS: usize = 8;
 
+// Clearance.
+
+/// Pieces that are looked into for the least distance on one way. Few ways need 10,000; those of threads with play, along
+/// which all flanks are equally near, never end. At half, the bound of these is a little lower; at double, they take
+/// twice as long.
+pub(crate) const APPROACH_ITEMS: usize = 300_000;
+/// Vertices of a patch (three for each triangle at most) whose hull bounds its distance. At half, only leaves have hulls;
+/// at double, the hull of a patch takes longer than those of its parts.
+pub(crate) const APPROACH_HULL: usize = 64;
+
 // Converters of STEP files. Measured with the converters in `clients/step` (OCCT 8.0, November 2026, two slow cores):
 // 0.6 s to start, 0.4 s and 14 MB of memory per MB of plane faces, 1 s per MB of curved ones.
 

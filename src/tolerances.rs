@@ -565,6 +565,16 @@ pub(crate) const TAPPED_HOLE: [f64; 2] = [0.75, 1.025];
 /// half, a screw counts as fast that a quarter of a turn frees; at double, the thinnest nuts hold nothing.
 pub(crate) const LEAST_ENGAGEMENT: f64 = 0.3;
 
+// Clearance.
+
+/// Share of the least distance on a way by which its certified bound is below it. At half, ways with turns take up to twice
+/// as long; at double, still a fifth of what people look at.
+pub(crate) const APPROACH_PRECISION: f64 = 0.01;
+/// Share of the longest side of the smaller part of a pair. Parts that are assembled no further apart count as touching: ten
+/// times the rounding of binary STL files, whose coordinates are 10 times as large as the part. At half, touching parts of
+/// such files have a clearance; at double, so have fewer fits.
+pub(crate) const ASSEMBLED_CONTACT: f64 = 1e-5;
+
 // Tessellation of STEP files.
 
 /// mm. How far the triangles of a STEP file may be from its surfaces, if the user does not say: the smallest play that is

@@ -11,6 +11,7 @@ use crate::geometry::Waypoint;
 use crate::search;
 
 mod bench;
+mod clearance;
 mod input;
 mod load;
 mod poses;
@@ -21,6 +22,7 @@ mod view;
 use poses::{direction, moved, rotation};
 
 pub(super) use bench::{BenchArguments, BenchCommand, BenchReport, BenchRun, BenchScale, BenchUnit};
+pub(super) use clearance::ClearanceArguments;
 pub(super) use input::Input;
 pub(super) use load::{BenchCancel, BenchLoad, BenchLoadClient, BenchSoak};
 pub(super) use poses::placed;
@@ -65,6 +67,8 @@ pub(super) enum Command {
     Statics(StaticsArguments),
     /// Say when which arm carries out which step of a plan, and what it holds
     Schedule(ScheduleArguments),
+    /// Say how near the parts that a plan moves pass the others
+    Clearance(ClearanceArguments),
     /// Show the state of the running daemon
     Status(super::status::StatusArguments),
     /// Check a configuration of the daemon

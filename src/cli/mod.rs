@@ -1,13 +1,14 @@
 //! The command line `sbdp`.
 //!
 //! `plan` asks the daemon if one runs, else a service in this process; `check` always works
-//! here; `view`, `graph`, `steps`, `statics` and `schedule` show; `cache` looks after the store on disk; `bench` runs `plan` in processes of its own. Results go to stdout; progress, warnings about the way there and errors to stderr.
+//! here; `view`, `graph`, `steps`, `statics`, `schedule` and `clearance` show; `cache` looks after the store on disk; `bench` runs `plan` in processes of its own. Results go to stdout; progress, warnings about the way there and errors to stderr.
 
 mod args;
 mod backend;
 mod bench;
 mod cache;
 mod check;
+mod clearance;
 mod config;
 mod daemon;
 mod error;
@@ -55,6 +56,7 @@ pub fn run() -> ExitCode {
         Command::Steps(arguments) => steps::run(&arguments),
         Command::Statics(arguments) => statics::run(&arguments),
         Command::Schedule(arguments) => schedule::run(&arguments),
+        Command::Clearance(arguments) => clearance::run(&arguments),
         Command::Status(arguments) => status::run(&arguments),
         Command::Config(arguments) => config::run(&arguments),
         Command::Cache(arguments) => cache::run(&arguments),

@@ -41,10 +41,7 @@ impl StandingPlan {
             join: pairs(plan, "--join", &arguments.join)?,
             apart: pairs(plan, "--apart", &arguments.apart)?,
         };
-        let (service, id) = subject.admitted()?;
-        if service.assembly(id)?.parts.iter().map(|part| &part.name).ne(&plan.parts) {
-            return Err(CliError::Refused("the assembly has other parts than the plan".to_owned()));
-        }
+        let (service, id) = subject.admitted_with_parts_of_plan()?;
         Ok(Self { plan: subject.plan, stays, service, id, query })
     }
 

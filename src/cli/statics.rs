@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::args::StaticsArguments;
 use super::error::CliError;
 use super::standing::{StandingPlan, check_order_is_free};
-use super::table::TextTable;
+use super::table::{TextTable, listed};
 use super::{interrupt, print, written, written_as_json};
 use crate::document::{PlanDocument, StepDocument};
 use crate::geometry::pose_from_waypoint;
@@ -229,16 +229,6 @@ fn fall(unstable: &UnstableDocument<'_>) -> String {
         unstable.falls.first().map_or_else(String::new, |fall| format!(" along {}", vector(&fall.direction)));
     let pressed = if unstable.needs_clamping { ", as nothing presses it" } else { "" };
     format!("{} {}{to}{pressed}", listed(&names), if names.len() == 1 { "falls" } else { "fall" })
-}
-
-/// A few names, and how many there are besides.
-fn listed(names: &[&str]) -> String {
-    /// Count of names. At half, pairs look like many; at double, the table is wider than most terminals.
-    const NAMED: usize = 3;
-    match names.get(..NAMED) {
-        Some(few) if names.len() > NAMED => format!("{} and {} more", few.join(", "), names.len() - NAMED),
-        _ => names.join(", "),
-    }
 }
 
 fn vector(vector: &[f64; 3]) -> String {

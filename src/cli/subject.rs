@@ -101,6 +101,15 @@ impl Subject {
         Ok((service, id))
     }
 
+    /// The same, refused unless it has just the parts of the plan, so that these have the same numbers.
+    pub(super) fn admitted_with_parts_of_plan(&self) -> Result<(Service, AssemblyId), CliError> {
+        let (service, id) = self.admitted()?;
+        if service.assembly(id)?.parts.iter().map(|part| &part.name).ne(&self.plan.parts) {
+            return Err(CliError::Refused("the assembly has other parts than the plan".to_owned()));
+        }
+        Ok((service, id))
+    }
+
     /// The assembly as the plan begins with it.
     pub(super) fn assembly(&self) -> Result<Assembly, CliError> {
         let (service, id) = self.admitted()?;

@@ -31,6 +31,16 @@ impl TextTable {
     }
 }
 
+/// A few names, and how many there are besides.
+pub(super) fn listed(names: &[&str]) -> String {
+    /// Count of names. At half, pairs look like many; at double, the table is wider than most terminals.
+    const NAMED: usize = 3;
+    match names.get(..NAMED) {
+        Some(few) if names.len() > NAMED => format!("{} and {} more", few.join(", "), names.len() - NAMED),
+        _ => names.join(", "),
+    }
+}
+
 /// Bytes in few digits, in powers of 1024, as the configuration counts them.
 pub(super) fn bytes(count: u64) -> String {
     const UNITS: [&str; 4] = ["kB", "MB", "GB", "TB"];

@@ -11,11 +11,13 @@
 //! | whether two threads pass each other along their helix | `helix_profile` | the stretches left open |
 //! | which path off a thread keeps its surfaces furthest apart | `helix_profile::path_on_thread` | a path |
 //! | which ways lead a part off the threads that it shares with others | `helix_profile::ways_off` | paths |
+//! | how near bodies pass others on their way | [`closest_approach`] | a distance, and a bound |
 //! | whether the hulls of a body and of all others are apart | [`exit_direction`](crate::scene::exit_direction) | a direction |
 //!
 //! `course` says how points move along a path, [`PairPath`] which way a body takes past another. Contact knows the scene
 //! and nothing of simulation, plans and search.
 
+mod closest_approach;
 pub(crate) mod constraint;
 pub(crate) mod course;
 pub(crate) mod helix_profile;
@@ -25,6 +27,7 @@ pub(crate) mod region_cover;
 pub(crate) mod sampled;
 mod shape_cast;
 
+pub use closest_approach::{ClosestApproach, PassedPair, closest_approach};
 pub use obstruction::{is_seen_to_enter, obstruction};
 pub use pair_path::PairPath;
 pub use region_cover::ShiftCoverCache;

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 pub use files::{absolute, content_of, source, with_files};
 pub use order::reordered;
 pub(crate) use placements::MOTION_ROUNDING;
-pub use placements::{Placements, StepFrame};
+pub use placements::{Placements, StepFrame, StepParts};
 pub use sbdp_ipc::document::{
     BlockedDocument, CacheDocument, FreeGroupDocument, GroupDocument, InitialDocument, OverlapDocument,
     PlanDocument, SCHEMA, SourceDocument, StatsDocument, StepDocument, WarningDocument,

@@ -45,6 +45,15 @@ struct Standing {
     pose: Pose,
 }
 
+/// What a step moves, and what stands with it in the same body meanwhile: numbers of parts, each with its pose in that body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StepParts {
+    /// What it moves.
+    pub moving: Vec<(usize, Pose)>,
+    /// What stands.
+    pub standing: Vec<(usize, Pose)>,
+}
+
 /// What a step took out.
 #[derive(Debug, Clone, Copy)]
 struct Body {
@@ -61,6 +70,25 @@ impl Placements {
     /// not stand in the body named by `of`, or along no path; or it ends in a way that is not known, or not of this
     /// kind of plan.
     pub fn new(kind: PlanKind, plan: &PlanDocument) -> Result<Self, String> {
+        Self::carried_out(kind, plan, |_, _| ())
+    }
+
+    /// By step, what it moves and what stands with it then.
+    ///
+    /// # Errors
+    /// As of [`Self::new`].
+    pub fn parts_of_steps(kind: PlanKind, plan: &PlanDocument) -> Result<Vec<StepParts>, String> {
+        let mut found: Vec<Option<StepParts>> = vec![None; plan.steps.len()];
+        Self::carried_out(kind, plan, |number, parts| found[number] = Some(parts()))?;
+        Ok(found.into_iter().flatten().collect())
+    }
+
+    /// Carries a plan out. `visit` is called with the number of each step and what says which parts it is about.
+    fn carried_out(
+        kind: PlanKind,
+        plan: &PlanDocument,
+        mut visit: impl FnMut(usize, &dyn Fn() -> StepParts),
+    ) -> Result<Self, String> {
         let numbers: HashMap<&str, usize> = plan.parts.iter().map(String::as_str).zip(0..).collect();
         let whole = Standing { body: None, pose: Pose::identity() };
         let mut parts: Vec<Option<Standing>> = vec![Some(whole); plan.parts.len()];
@@ -83,7 +111,7 @@ impl Placements {
             let far = far.map(pose_from_waypoint).ok_or_else(|| {
                 format!("`steps[{number}].path` is empty; parts that are free have one waypoint")
             })?;
-            let (mut standing, mut once) = (Vec::new(), HashSet::new());
+            let (mut moving, mut once) = (Vec::new(), HashSet::new());
             for name in &step.parts {
                 let part = *numbers.get(name.as_str()).ok_or_else(|| {
                     format!("`steps[{number}].parts` names `{name}`, which is not among `parts`")
@@ -91,15 +119,24 @@ impl Placements {
                 if !once.insert(part) {
                     return Err(format!("`steps[{number}].parts` names `{name}` twice"));
                 }
-                let of = step.of;
-                let stands = parts[part].as_mut().filter(|stands| stands.body == of);
-                let stands = stands.ok_or_else(|| misplaced(kind, number, step, name))?;
-                standing.push(stands.pose);
-                match ends {
-                    StepEnd::Aside => stands.pose = far * stands.pose,
-                    StepEnd::Out | StepEnd::In => stands.body = Some(number),
-                }
+                let stands = parts[part].filter(|stands| stands.body == step.of);
+                moving.push((part, stands.ok_or_else(|| misplaced(kind, number, step, name))?.pose));
             }
+            visit(number, &|| {
+                let standing = parts.iter().enumerate().filter_map(|(part, stands)| {
+                    stands
+                        .filter(|stands| stands.body == step.of && !once.contains(&part))
+                        .map(|s| (part, s.pose))
+                });
+                StepParts { moving: moving.clone(), standing: standing.collect() }
+            });
+            for &(part, pose) in &moving {
+                parts[part] = Some(match ends {
+                    StepEnd::Aside => Standing { body: step.of, pose: far * pose },
+                    StepEnd::Out | StepEnd::In => Standing { body: Some(number), pose },
+                });
+            }
+            let standing = moving.into_iter().map(|(_, pose)| pose).collect();
             bodies[number] =
                 Some(Body { frame: body * far, is_group: ends != StepEnd::Aside && step.parts.len() > 1 });
             steps[number] = Some(StepFrame { body, standing, ends });

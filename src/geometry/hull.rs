@@ -202,15 +202,39 @@ pub fn separating(a: &Support<'_>, b: &Support<'_>, margin: f64) -> Option<Vecto
 
 /// The direction that GJK proposes for two hulls that have points.
 fn proposed<S: SupportMap>(a: &S, b: &S) -> Option<Vector3<f64>> {
-    let start = a.local_support_point(ParryVector::X) - b.local_support_point(-ParryVector::X);
-    let mut simplex = VoronoiSimplex::new();
-    simplex.reset(CsoPoint::from_shapes(&ParryPose::IDENTITY, a, b, start));
-    let found = closest_points(&ParryPose::IDENTITY, a, b, f64::MAX, true, &mut simplex);
-    let d = match found {
+    let d = match gjk(a, b) {
         GJKResult::ClosestPoints(_, _, d) | GJKResult::Proximity(d) | GJKResult::NoIntersection(d) => d,
         GJKResult::Intersection => return None,
     };
     Vector3::new(d.x, d.y, d.z).try_normalize(1e-12)
+}
+
+fn gjk<S: SupportMap>(a: &S, b: &S) -> GJKResult {
+    let start = a.local_support_point(ParryVector::X) - b.local_support_point(-ParryVector::X);
+    let mut simplex = VoronoiSimplex::new();
+    simplex.reset(CsoPoint::from_shapes(&ParryPose::IDENTITY, a, b, start));
+    closest_points(&ParryPose::IDENTITY, a, b, f64::MAX, true, &mut simplex)
+}
+
+/// How far two hulls of a few points are apart.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HullDistance {
+    /// A bound that projections certify: they are no nearer. 0 where they meet.
+    pub at_least: f64,
+    /// A point of either, nearest to each other up to rounding; `None` where they meet.
+    pub points: Option<[Point3<f64>; 2]>,
+}
+
+/// The distance of two hulls of at least one point each.
+#[must_use]
+pub fn hull_distance(a: &[Point3<f64>], b: &[Point3<f64>]) -> HullDistance {
+    let (d, points) = match gjk(&Few(a), &Few(b)) {
+        GJKResult::ClosestPoints(p, q, d) => (d, Some([p, q].map(|p| Point3::new(p.x, p.y, p.z)))),
+        GJKResult::Proximity(d) | GJKResult::NoIntersection(d) => (d, None),
+        GJKResult::Intersection => return HullDistance { at_least: 0.0, points: None },
+    };
+    let direction = Vector3::new(d.x, d.y, d.z).try_normalize(1e-12);
+    HullDistance { at_least: direction.map_or(0.0, |d| gap_along(&d, a, b).max(0.0)), points }
 }
 
 /// Points after a pose.

@@ -72,7 +72,10 @@ pub use half_space::Cloud;
 pub(crate) use heal::same_places;
 pub use heal::{Healed, heal, heal_until};
 pub use helix::{Footprint, Helix, radii};
-pub use hull::{Support, gap_along, hull_vertices, separating, separating_direction, transformed};
+pub use hull::{
+    HullDistance, Support, gap_along, hull_distance, hull_vertices, separating, separating_direction,
+    transformed,
+};
 pub use hull_depth::HullDepth;
 pub use inner_points::SurfacePoint;
 pub use linking_number::linking_number;
@@ -80,7 +83,7 @@ pub use mass::MassProperties;
 pub use mesh::{Edge, Mesh, Solidity};
 pub use oriented::OrientedSamples;
 pub use patch_tree::{Parts, PatchTree};
-pub use pose::{Pose, Waypoint, interpolate, pose_from_waypoint, waypoint_from_pose};
+pub use pose::{Pose, Waypoint, interpolate, pose_from_waypoint, scaled_pose, waypoint_from_pose};
 pub use random::Uniform;
 pub(crate) use records::{
     AssemblySource, HEALED, SHAPE, SOURCE, add_bounds, add_pose, has_source, healed_assembly, recent_sources,

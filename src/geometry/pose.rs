@@ -27,6 +27,12 @@ pub fn pose_from_waypoint(w: &Waypoint) -> Pose {
     Pose::from_parts(Translation3::new(w[0], w[1], w[2]), UnitQuaternion::from_quaternion(q))
 }
 
+/// The same motion of lengths that are `factor` times as long.
+#[must_use]
+pub fn scaled_pose(pose: &Pose, factor: f64) -> Pose {
+    Pose::from_parts(Translation3::from(pose.translation.vector * factor), pose.rotation)
+}
+
 /// Where a pose between `a` (at `u` = 0) and `b` (at `u` = 1) lies: `centre`, a point of the
 /// body, moves on a line and the rotation slerps. This is the interpolation that every plan
 /// promises between two waypoints (centre: that of the part's bounding box).

@@ -7,9 +7,7 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use nalgebra::Vector3;
-
-use crate::geometry::{Bounds, Pose, SampleTree, Shape};
+use crate::geometry::{Bounds, Pose, SampleTree, Shape, scaled_pose};
 use crate::sdf::Field;
 
 use super::{AllowedPenetrations, Body, Scene};
@@ -55,11 +53,6 @@ impl OwnScale {
     pub(crate) fn restored(&self, pose: &Pose) -> Pose {
         scaled_pose(pose, 1.0 / self.factor)
     }
-}
-
-fn scaled_pose(pose: &Pose, factor: f64) -> Pose {
-    let shift: Vector3<f64> = pose.translation.vector * factor;
-    Pose::from_parts(shift.into(), pose.rotation)
 }
 
 /// The scaled shapes of one request, by content and factor, so that each is made once.

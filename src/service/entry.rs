@@ -30,11 +30,15 @@ use super::records::{PlanAnswer, PlanQuestion, remember_plan, remembered_plan};
 use super::relay::{Discard, Relay, WithoutSteps};
 use super::shared_shape::SharedShape;
 
+/// Refuses what is no length.
+pub(super) fn check_length(field: &'static str, length: Option<f64>) -> Result<(), ServiceError> {
+    let wrong = length.filter(|length| !length.is_finite() || *length < 0.0);
+    wrong.map_or(Ok(()), |value| Err(ServiceError::NoLength { field, value }))
+}
+
 /// Refuses values of a request that are none.
 fn check_values(request: &PlanRequest) -> Result<(), ServiceError> {
-    if let Some(value) = request.clearance.filter(|length| !length.is_finite() || *length < 0.0) {
-        return Err(ServiceError::NoLength { field: "clearance", value });
-    }
+    check_length("clearance", request.clearance)?;
     let is_direction = |up: &[f64; 3]| {
         let length = Vector3::from(*up).norm();
         length.is_finite() && length > 0.0

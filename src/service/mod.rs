@@ -9,6 +9,7 @@
 
 mod answer;
 mod assembly_plan;
+mod clearance;
 mod entry;
 mod pools;
 mod prepared;
@@ -28,7 +29,7 @@ use serde::{Deserialize, Serialize};
 use crate::blocking_graph::{Analysis, Audit, DirectionalGraph, StaticAnalysis, audit};
 use crate::cache::{Cache, CacheStatistics, RequestCache};
 use crate::geometry::{
-    Assembly, AssemblySource, GeometryError, Revision, SourceAssembly, content_hash, has_source,
+    Assembly, AssemblySource, GeometryError, Pose, Revision, SourceAssembly, content_hash, has_source,
     healed_assembly, recent_sources, remember_healed, source_of,
 };
 use crate::plan::{Overlap, Plan, Warning};
@@ -38,7 +39,8 @@ use crate::search::{Engine, PlanRequest, PlanSink, Staging, axes_of, least_trave
 use crate::simulation::{Action, Axis, PenaltyParameters};
 use crate::termination::{Interrupt, Termination};
 
-use entry::{Entry, engine_of};
+pub use clearance::{ClearanceQuery, PartClearance, PassingStep, StepClearance};
+use entry::{Entry, check_length, engine_of};
 use pools::Pools;
 pub use records::RECORD_KINDS;
 pub(crate) use records::{AnsweredQuestion, recent_answers, remember_answer, remembered_answer};
@@ -389,6 +391,27 @@ impl Service {
         let least = |part| least_travel(scene, part);
         let engine = engine_of(engine, PenaltyParameters::default());
         Ok(audit(rule, scene, &present, &*engine, &least, termination).ok())
+    }
+
+    /// How near the parts that move in some steps pass those that stand.
+    ///
+    /// # Errors
+    /// The assembly is unknown, a part does not exist, the distance that is wanted is no length, or the termination condition
+    /// became true (`Ok(None)`).
+    pub fn clearance(
+        &self,
+        id: AssemblyId,
+        query: &ClearanceQuery,
+        termination: &Termination,
+    ) -> Result<Option<Vec<StepClearance>>, ServiceError> {
+        let entry = self.entry(id, termination)?;
+        let count = entry.assembly.parts.len();
+        for PassingStep { moving, standing, .. } in &query.steps {
+            let parts = |of: &[(usize, Pose)]| of.iter().map(|(part, _)| *part).collect();
+            check_parts(&[("moving", parts(moving)), ("standing", parts(standing))], count)?;
+        }
+        check_length("wanted", query.wanted)?;
+        Ok(clearance::answer(&entry.assembly, query, termination).ok())
     }
 
     /// How the parts of an assembly stand under gravity in each of some states.

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use rayon::prelude::*;
 
 use crate::fasteners::Fastener;
-use crate::geometry::{Assembly, Pose};
+use crate::geometry::{Assembly, Pose, scaled_pose};
 use crate::scene::{Scene, StandingParts, exit_direction};
 use crate::simulation::NullTwist;
 use crate::statics::{Stability, Statics, StaticsOptions};
@@ -104,7 +104,7 @@ pub(super) fn answer(
         let places: Vec<(usize, Pose)> = aside
             .iter()
             .map(|(part, motion)| {
-                (*part, scaled(motion, assembly.scale) * scene.bodies[*part].planning_from_shape)
+                (*part, scaled_pose(motion, assembly.scale) * scene.bodies[*part].planning_from_shape)
             })
             .collect();
         let scene = scene.with_placed(&places);
@@ -185,7 +185,7 @@ pub(super) fn steady_order(
             let OrderedStep { parts, end, .. } = &steps[number];
             let rest: Vec<usize> = standing.iter().copied().filter(|part| !parts.contains(part)).collect();
             if let (Some(end), &[part]) = (end, &parts[..])
-                && !is_out(scene, &rest, part, &scaled(end, assembly.scale))
+                && !is_out(scene, &rest, part, &scaled_pose(end, assembly.scale))
             {
                 continue;
             }
@@ -257,11 +257,6 @@ fn joints<'f>(
     let kinds = pairs.into_par_iter().map(|pair| Ok((pair, kind(pair)?)));
     let kinds = kinds.collect::<Result<Vec<_>, Interrupt>>()?;
     Ok(kinds.into_iter().filter_map(|(pair, kind)| Some((pair, kind?))).collect())
-}
-
-/// A motion of the input's frame in the planning frame.
-fn scaled(motion: &Pose, scale: f64) -> Pose {
-    Pose { translation: (motion.translation.vector * scale).into(), ..*motion }
 }
 
 /// Whether contact leaves two parts a helix to move along each other.

@@ -53,3 +53,13 @@ fn quaternion([w, x, y, z]: [f64; 4]) -> Option<UnitQuaternion<f64>> {
     UnitQuaternion::try_new(Quaternion::new(w, x, y, z), f64::MIN_POSITIVE)
         .filter(|q| q.coords.iter().all(|c| c.is_finite()))
 }
+
+/// A finite number from 0 up.
+pub(super) fn not_negative(text: &str) -> Result<f64, String> {
+    let number: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    if number.is_finite() && number >= 0.0 {
+        Ok(number)
+    } else {
+        Err("not a finite number from 0 up".to_owned())
+    }
+}

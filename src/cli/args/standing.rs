@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::poses::direction as vector;
+use super::poses::{direction as vector, not_negative};
 
 /// A plan, and how its parts stand.
 #[derive(Debug, Args)]
@@ -71,13 +71,4 @@ pub(in crate::cli) struct ScheduleArguments {
     /// Write the schedule as JSON to this file (`-`: to stdout, instead of the table)
     #[arg(long, value_name = "FILE")]
     pub(in crate::cli) json: Option<PathBuf>,
-}
-
-fn not_negative(text: &str) -> Result<f64, String> {
-    let number: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
-    if number.is_finite() && number >= 0.0 {
-        Ok(number)
-    } else {
-        Err("not a finite number from 0 up".to_owned())
-    }
 }

@@ -1,0 +1,163 @@
+//! `sbdp clearance`: how near the moving parts of a plan pass the others.
+
+use std::process::ExitCode;
+
+use serde::Serialize;
+
+use super::args::ClearanceArguments;
+use super::error::CliError;
+use super::subject::Subject;
+use super::table::{TextTable, length, listed};
+use super::{interrupt, print, written_as_json};
+use crate::document::{Placements, PlanDocument, StepParts};
+use crate::geometry::pose_from_waypoint;
+use crate::search::Termination;
+use crate::service::{ClearanceQuery, PartClearance, PassingStep, StepClearance};
+use crate::view::kind_of;
+
+/// The version of the document.
+const SCHEMA: &str = "sbdp-clearance/1";
+/// The exit code where something comes nearer than is wanted: that of a plan that is not complete.
+const NOT_KEPT: u8 = 3;
+
+/// What `--json` writes. Names are those of the plan; lengths and points are in its units and frame.
+#[derive(Debug, Serialize)]
+struct ClearanceDocument<'a> {
+    schema: &'static str,
+    units: Option<&'a str>,
+    wanted: Option<f64>,
+    steps: Vec<StepClearanceDocument<'a>>,
+}
+
+#[derive(Debug, Serialize)]
+struct StepClearanceDocument<'a> {
+    step: usize,
+    parts: &'a [String],
+    touching: Vec<&'a str>,
+    closest: Option<PartClearanceDocument<'a>>,
+    short: Vec<PartClearanceDocument<'a>>,
+}
+
+#[derive(Debug, Serialize)]
+struct PartClearanceDocument<'a> {
+    moving: &'a str,
+    standing: &'a str,
+    distance: f64,
+    at_least: f64,
+    assembled: f64,
+    segment: usize,
+    share: f64,
+    points: Option<[[f64; 3]; 2]>,
+}
+
+pub(super) fn run(arguments: &ClearanceArguments) -> Result<ExitCode, CliError> {
+    let subject = Subject::read(&arguments.plan, arguments.meshes.as_deref())?;
+    let plan = &subject.plan;
+    let (service, id) = subject.admitted_with_parts_of_plan()?;
+    let termination = Termination::default();
+    interrupt::cancel_on_interrupt(&termination.cancel_flag())?;
+    let query = ClearanceQuery { steps: passing_steps(plan)?, wanted: arguments.at_least };
+    let found = service.clearance(id, &query, &termination)?;
+    let found = found.ok_or_else(|| CliError::Failed("interrupted".to_owned()))?;
+    let document = document(plan, &found, arguments.at_least);
+    let is_kept = document.steps.iter().all(|step| step.short.is_empty());
+    let exit_code = if is_kept { ExitCode::SUCCESS } else { ExitCode::from(NOT_KEPT) };
+    if let Some(file) = &arguments.json
+        && written_as_json(file, &document, "clearances")?
+    {
+        return Ok(exit_code);
+    }
+    print(&table(&document))?;
+    Ok(exit_code)
+}
+
+fn passing_steps(plan: &PlanDocument) -> Result<Vec<PassingStep>, CliError> {
+    let parts = Placements::parts_of_steps(kind_of(plan), plan).map_err(CliError::Refused)?;
+    let step = |(StepParts { moving, standing }, path): (StepParts, &Vec<_>)| PassingStep {
+        moving,
+        standing,
+        path: path.iter().map(pose_from_waypoint).collect(),
+    };
+    Ok(parts.into_iter().zip(plan.steps.iter().map(|step| &step.path)).map(step).collect())
+}
+
+fn document<'a>(
+    plan: &'a PlanDocument,
+    found: &[StepClearance],
+    wanted: Option<f64>,
+) -> ClearanceDocument<'a> {
+    let name = |part: usize| plan.parts.get(part).map_or("?", String::as_str);
+    let described = |found: &PartClearance| PartClearanceDocument {
+        moving: name(found.moving),
+        standing: name(found.standing),
+        distance: found.distance,
+        at_least: found.at_least,
+        assembled: found.assembled,
+        segment: found.segment,
+        share: found.share,
+        points: found.points.map(|points| points.map(|p| p.coords.into())),
+    };
+    let steps =
+        plan.steps.iter().zip(found).enumerate().map(|(number, (step, found))| StepClearanceDocument {
+            step: number,
+            parts: &step.parts,
+            touching: found.touching.iter().map(|&part| name(part)).collect(),
+            closest: found.closest.as_ref().map(described),
+            short: found.short.iter().map(described).collect(),
+        });
+    ClearanceDocument { schema: SCHEMA, units: plan.units.as_deref(), wanted, steps: steps.collect() }
+}
+
+fn table(document: &ClearanceDocument<'_>) -> String {
+    let units = document.units;
+    let mut table =
+        TextTable::new(&["step", "moves", "nearest", "certain", "to", "on the way", "touches at first"]);
+    for step in &document.steps {
+        let moves = listed(&step.parts.iter().map(String::as_str).collect::<Vec<_>>());
+        let [distance, certain, to, at] = match &step.closest {
+            None => ["–"; 4].map(str::to_owned),
+            Some(closest) => [
+                length(closest.distance, units),
+                length(closest.at_least, units),
+                if step.parts.len() > 1 {
+                    format!("{} from {}", closest.standing, closest.moving)
+                } else {
+                    closest.standing.to_owned()
+                },
+                format!("{}, {:.0} %", closest.segment + 1, closest.share * 100.0),
+            ],
+        };
+        table.row([(step.step + 1).to_string(), moves, distance, certain, to, at, listed(&step.touching)]);
+    }
+    let mut text = table.render();
+    text.push_str(
+        "\nNearest: the least distance on the way, from parts that are not touched at first. Certain: no part comes nearer. \
+         On the way: the segment of the path, and how far along it.\n",
+    );
+    if let Some(wanted) = document.wanted {
+        text.push_str(&format!("\n{}\n", verdict(document, wanted)));
+    }
+    text
+}
+
+/// Which pairs of parts do not keep the distance that is wanted.
+fn verdict(document: &ClearanceDocument<'_>, wanted: f64) -> String {
+    let units = document.units;
+    let short = document.steps.iter().flat_map(|step| step.short.iter().map(move |pair| (step.step, pair)));
+    let line = |(step, pair): (usize, &PartClearanceDocument<'_>)| {
+        format!(
+            "step {}: {} passes {} at {}, as assembled {}\n",
+            step + 1,
+            pair.moving,
+            pair.standing,
+            length(pair.distance, units),
+            length(pair.assembled, units)
+        )
+    };
+    let lines: String = short.map(line).collect();
+    if lines.is_empty() {
+        format!("All parts keep {}, or what they have as they stand.", length(wanted, units))
+    } else {
+        format!("Nearer than {}, and than they stand:\n{}", length(wanted, units), lines.trim_end())
+    }
+}
