@@ -12,7 +12,7 @@ use std::{env, fs, io};
 
 /// Every stage, and the stages that its code imports. A stage comes after all that it depends on.
 /// `.ci/structure` compares this table with the imports.
-const STAGES: [(&str, &str); 22] = [
+const STAGES: [(&str, &str); 23] = [
     ("lru", ""),
     ("termination", ""),
     ("tolerances", ""),
@@ -28,6 +28,7 @@ const STAGES: [(&str, &str); 22] = [
     ("contact", "budgets geometry scene sdf termination tolerances"),
     ("fasteners", "geometry tolerances"),
     ("statics", "budgets geometry scene termination tolerances"),
+    ("tools", "contact fasteners geometry termination tolerances"),
     ("simulation", "budgets cache contact geometry scene sdf termination tolerances"),
     ("blocking_graph", "cache geometry scene simulation termination"),
     ("plan", "budgets cache contact geometry scene termination tolerances"),
@@ -38,7 +39,7 @@ const STAGES: [(&str, &str); 22] = [
     ("assembling", "contact geometry plan rrt scene search termination"),
     (
         "service",
-        "assembling blocking_graph cache contact fasteners geometry lru plan scene sdf search simulation statics termination tolerances",
+        "assembling blocking_graph cache contact fasteners geometry lru plan scene sdf search simulation statics termination tolerances tools",
     ),
     (
         "daemon",

@@ -1,6 +1,7 @@
 //! Solids, surfaces and scenes that several modules' unit tests are written over.
 
 use std::collections::HashMap;
+use std::f64::consts::FRAC_PI_3;
 use std::sync::Arc;
 
 use nalgebra::{Point3, Vector3};
@@ -60,6 +61,52 @@ pub(crate) fn rod(radius: f64, z: [f64; 2], count: u32) -> SourceMesh {
         t[0] != t[1] && t[1] != t[2] && t[2] != t[0]
     });
     mesh
+}
+
+/// Flat sides of what is round; a multiple of six.
+const SECTORS: u32 = 48;
+
+/// A ring around z.
+#[derive(Clone, Copy)]
+pub(crate) enum Ring {
+    Round(f64),
+    /// By the distance of its flats.
+    Hexagon(f64),
+}
+
+impl Ring {
+    fn radius(self, angle: f64) -> f64 {
+        match self {
+            Self::Round(radius) => radius,
+            Self::Hexagon(across) => across / 2.0 / (angle.rem_euclid(FRAC_PI_3) - FRAC_PI_3 / 2.0).cos(),
+        }
+    }
+}
+
+/// A solid between rings, each at its height: counter-clockwise around the material if x leads outward and z up. Radii of 0
+/// close it at the axis.
+pub(crate) fn turned(profile: &[(Ring, f64)]) -> SourceMesh {
+    let mut mesh = SourceMesh::default();
+    let count = profile.len() as u32;
+    for sector in 0..SECTORS {
+        let angle = f64::from(sector) * std::f64::consts::TAU / f64::from(SECTORS);
+        for (ring, z) in profile {
+            let radius = ring.radius(angle);
+            mesh.vertices.push([radius * angle.cos(), radius * angle.sin(), *z]);
+        }
+        let (here, next) = (sector * count, (sector + 1) % SECTORS * count);
+        for i in 0..count {
+            let j = (i + 1) % count;
+            mesh.triangles.extend([[here + i, next + i, next + j], [here + i, next + j, here + j]]);
+        }
+    }
+    mesh
+}
+
+/// A nut about z, by the distance of its flats and the radius of its hole.
+pub(crate) fn nut(across: f64, hole: f64, height: f64) -> SourceMesh {
+    use Ring::{Hexagon, Round};
+    turned(&[(Round(hole), 0.0), (Hexagon(across), 0.0), (Hexagon(across), height), (Round(hole), height)])
 }
 
 /// A bearing about z with a slot towards +x, and in it a shaft of radius 1 with two flats, turned from where they are

@@ -79,4 +79,5 @@ pub mod statics;
 pub mod telemetry;
 pub mod termination;
 mod tolerances;
+pub mod tools;
 pub mod view;

@@ -574,6 +574,10 @@ pub(crate) const APPROACH_PRECISION: f64 = 0.01;
 /// times the rounding of binary STL files, whose coordinates are 10 times as large as the part. At half, touching parts of
 /// such files have a clearance; at double, so have fewer fits.
 pub(crate) const ASSEMBLED_CONTACT: f64 = 1e-5;
+/// Share of the width across flats. A tool that comes nearer than this to a part does not pass it: the play of a ring on its
+/// hexagon is 0.01 to 0.02 (ISO 691). At half, tools pass that scrape; at double, a ring on a low nut touches what the
+/// nut stands on.
+pub(crate) const TOOL_GAP: f64 = 0.01;
 
 // Tessellation of STEP files.
 

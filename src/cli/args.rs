@@ -17,6 +17,7 @@ mod load;
 mod poses;
 mod standing;
 mod through_daemon;
+mod tools;
 mod view;
 
 use poses::{direction, moved, rotation};
@@ -28,6 +29,7 @@ pub(super) use load::{BenchCancel, BenchLoad, BenchLoadClient, BenchSoak};
 pub(super) use poses::placed;
 pub(super) use standing::{ScheduleArguments, StandingArguments, StaticsArguments};
 pub(super) use through_daemon::{BenchChurn, BenchLatency, BenchRawPeer, BenchReplan, BenchRestart};
+pub(super) use tools::ToolsArguments;
 pub(super) use view::{GraphArguments, StepsArguments, ViewArguments};
 
 /// Plans how assemblies come apart.
@@ -69,6 +71,8 @@ pub(super) enum Command {
     Schedule(ScheduleArguments),
     /// Say how near the parts that a plan moves pass the others
     Clearance(ClearanceArguments),
+    /// Say which wrench, socket or key turns the fasteners that a plan takes off, and how far it can swing
+    Tools(ToolsArguments),
     /// Show the state of the running daemon
     Status(super::status::StatusArguments),
     /// Check a configuration of the daemon

@@ -9,11 +9,9 @@ use super::error::CliError;
 use super::subject::Subject;
 use super::table::{TextTable, length, listed};
 use super::{interrupt, print, written_as_json};
-use crate::document::{Placements, PlanDocument, StepParts};
-use crate::geometry::pose_from_waypoint;
+use crate::document::PlanDocument;
 use crate::search::Termination;
-use crate::service::{ClearanceQuery, PartClearance, PassingStep, StepClearance};
-use crate::view::kind_of;
+use crate::service::{ClearanceQuery, PartClearance, StepClearance};
 
 /// The version of the document.
 const SCHEMA: &str = "sbdp-clearance/1";
@@ -52,14 +50,13 @@ struct PartClearanceDocument<'a> {
 
 pub(super) fn run(arguments: &ClearanceArguments) -> Result<ExitCode, CliError> {
     let subject = Subject::read(&arguments.plan, arguments.meshes.as_deref())?;
-    let plan = &subject.plan;
     let (service, id) = subject.admitted_with_parts_of_plan()?;
     let termination = Termination::default();
     interrupt::cancel_on_interrupt(&termination.cancel_flag())?;
-    let query = ClearanceQuery { steps: passing_steps(plan)?, wanted: arguments.at_least };
+    let query = ClearanceQuery { steps: subject.passing_steps()?, wanted: arguments.at_least };
     let found = service.clearance(id, &query, &termination)?;
     let found = found.ok_or_else(|| CliError::Failed("interrupted".to_owned()))?;
-    let document = document(plan, &found, arguments.at_least);
+    let document = document(&subject.plan, &found, arguments.at_least);
     let is_kept = document.steps.iter().all(|step| step.short.is_empty());
     let exit_code = if is_kept { ExitCode::SUCCESS } else { ExitCode::from(NOT_KEPT) };
     if let Some(file) = &arguments.json
@@ -69,16 +66,6 @@ pub(super) fn run(arguments: &ClearanceArguments) -> Result<ExitCode, CliError> 
     }
     print(&table(&document))?;
     Ok(exit_code)
-}
-
-fn passing_steps(plan: &PlanDocument) -> Result<Vec<PassingStep>, CliError> {
-    let parts = Placements::parts_of_steps(kind_of(plan), plan).map_err(CliError::Refused)?;
-    let step = |(StepParts { moving, standing }, path): (StepParts, &Vec<_>)| PassingStep {
-        moving,
-        standing,
-        path: path.iter().map(pose_from_waypoint).collect(),
-    };
-    Ok(parts.into_iter().zip(plan.steps.iter().map(|step| &step.path)).map(step).collect())
 }
 
 fn document<'a>(

@@ -1,7 +1,7 @@
 //! The command line `sbdp`.
 //!
 //! `plan` asks the daemon if one runs, else a service in this process; `check` always works
-//! here; `view`, `graph`, `steps`, `statics`, `schedule` and `clearance` show; `cache` looks after the store on disk; `bench` runs `plan` in processes of its own. Results go to stdout; progress, warnings about the way there and errors to stderr.
+//! here; `view`, `graph`, `steps`, `statics`, `schedule`, `clearance` and `tools` show; `cache` looks after the store on disk; `bench` runs `plan` in processes of its own. Results go to stdout; progress, warnings about the way there and errors to stderr.
 
 mod args;
 mod backend;
@@ -30,6 +30,7 @@ mod status;
 mod steps;
 mod subject;
 mod table;
+mod tools;
 mod view;
 
 use std::io::Write;
@@ -57,6 +58,7 @@ pub fn run() -> ExitCode {
         Command::Statics(arguments) => statics::run(&arguments),
         Command::Schedule(arguments) => schedule::run(&arguments),
         Command::Clearance(arguments) => clearance::run(&arguments),
+        Command::Tools(arguments) => tools::run(&arguments),
         Command::Status(arguments) => status::run(&arguments),
         Command::Config(arguments) => config::run(&arguments),
         Command::Cache(arguments) => cache::run(&arguments),

@@ -9,15 +9,15 @@ use super::part_names::part_named;
 use crate::blocking_graph::DirectionalGraph;
 use crate::cache::CacheSettings;
 use crate::document::content_of;
-use crate::document::{MOTION_ROUNDING, Placements};
-use crate::document::{PlanDocument, SourceDocument};
+use crate::document::{MOTION_ROUNDING, Placements, StepParts};
+use crate::document::{PlanDocument, SourceDocument, StepDocument};
 use crate::files::{LoadOptions, StepSettings, load};
 use crate::geometry::{
     Assembly, Pose, Revision, SourceAssembly, SourceMesh, content_hash, pose_from_waypoint,
 };
 use crate::plan::PlanKind;
 use crate::search::Termination;
-use crate::service::{AssemblyId, Service};
+use crate::service::{AssemblyId, PassingStep, Service};
 use crate::view::{Instructions, PlanScene, Up, ViewError, equal_parts, glb, kind_of, page, read_plan};
 
 /// A plan, and the meshes that it moves.
@@ -108,6 +108,17 @@ impl Subject {
             return Err(CliError::Refused("the assembly has other parts than the plan".to_owned()));
         }
         Ok((service, id))
+    }
+
+    /// The steps of the plan with what moves and what stands in each.
+    pub(super) fn passing_steps(&self) -> Result<Vec<PassingStep>, CliError> {
+        let parts = Placements::parts_of_steps(kind_of(&self.plan), &self.plan).map_err(CliError::Refused)?;
+        let step = |(StepParts { moving, standing }, step): (StepParts, &StepDocument)| PassingStep {
+            moving,
+            standing,
+            path: step.path.iter().map(pose_from_waypoint).collect(),
+        };
+        Ok(parts.into_iter().zip(&self.plan.steps).map(step).collect())
     }
 
     /// The assembly as the plan begins with it.

@@ -76,6 +76,8 @@ pub struct Fastener {
     pub drive: Drive,
     /// The distance of opposite flats of its hexagon: the size of its tool, in the shape's unit.
     pub across_flats: f64,
+    /// Where the flats begin and end along the line, from its point.
+    pub flats: [f64; 2],
     /// The cylinder that has the thread.
     thread: RoundFace,
 }
@@ -93,9 +95,9 @@ impl Fastener {
             let rounds = round_faces(surface, &hexagon.line);
             let found = nut(&hexagon, &rounds).or_else(|| screw(&hexagon, &rounds));
             found.map(|(kind, thread)| {
-                let Hexagon { line, across_flats, .. } = hexagon;
+                let Hexagon { line, across_flats, along: flats, .. } = hexagon;
                 let drive = if hexagon.is_socket { Drive::HexagonSocket } else { Drive::Hexagon };
-                Self { kind, line, drive, across_flats, thread }
+                Self { kind, line, drive, across_flats, flats, thread }
             })
         })
     }

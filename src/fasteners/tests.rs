@@ -1,57 +1,12 @@
 //! Fasteners by the sizes of their standards, and what looks like them.
 
-use std::f64::consts::{FRAC_PI_3, TAU};
+use std::f64::consts::TAU;
 
 use nalgebra::Vector3;
 
 use super::*;
-use crate::fixtures::{cuboid, joined, moved, rod, surface, tube};
+use crate::fixtures::{Ring, cuboid, joined, moved, nut, rod, surface, tube, turned};
 use crate::geometry::SourceMesh;
-
-/// Flat sides of what is round; a multiple of six.
-const SECTORS: u32 = 48;
-
-/// A ring around z.
-#[derive(Clone, Copy)]
-enum Ring {
-    Round(f64),
-    /// By the distance of its flats.
-    Hexagon(f64),
-}
-
-impl Ring {
-    fn radius(self, angle: f64) -> f64 {
-        match self {
-            Self::Round(radius) => radius,
-            Self::Hexagon(across) => across / 2.0 / (angle.rem_euclid(FRAC_PI_3) - FRAC_PI_3 / 2.0).cos(),
-        }
-    }
-}
-
-/// A solid between rings, each at its height: counter-clockwise around the material if x leads outward and z up. Radii of 0
-/// close it at the axis.
-fn turned(profile: &[(Ring, f64)]) -> SourceMesh {
-    let mut mesh = SourceMesh::default();
-    let count = profile.len() as u32;
-    for sector in 0..SECTORS {
-        let angle = f64::from(sector) * TAU / f64::from(SECTORS);
-        for (ring, z) in profile {
-            let radius = ring.radius(angle);
-            mesh.vertices.push([radius * angle.cos(), radius * angle.sin(), *z]);
-        }
-        let (here, next) = (sector * count, (sector + 1) % SECTORS * count);
-        for i in 0..count {
-            let j = (i + 1) % count;
-            mesh.triangles.extend([[here + i, next + i, next + j], [here + i, next + j, here + j]]);
-        }
-    }
-    mesh
-}
-
-fn nut(across: f64, hole: f64, height: f64) -> SourceMesh {
-    use Ring::{Hexagon, Round};
-    turned(&[(Round(hole), 0.0), (Hexagon(across), 0.0), (Hexagon(across), height), (Round(hole), height)])
-}
 
 /// With its head below.
 fn hexagon_screw(across: f64, shank: f64, head: f64, length: f64) -> SourceMesh {

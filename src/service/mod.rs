@@ -20,6 +20,7 @@ mod statics;
 mod store;
 #[cfg(test)]
 mod tests;
+mod tools;
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Weak};
@@ -48,6 +49,7 @@ use relay::Discard;
 pub use statics::{JointKind, OrderedStep, StandingSession, StandingState, StaticsAnswer, StaticsQuery};
 use store::AssemblyStore;
 pub use store::StoreStatistics;
+pub use tools::FastenerTools;
 
 /// The name of an assembly: the hash of its content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -405,13 +407,24 @@ impl Service {
         termination: &Termination,
     ) -> Result<Option<Vec<StepClearance>>, ServiceError> {
         let entry = self.entry(id, termination)?;
-        let count = entry.assembly.parts.len();
-        for PassingStep { moving, standing, .. } in &query.steps {
-            let parts = |of: &[(usize, Pose)]| of.iter().map(|(part, _)| *part).collect();
-            check_parts(&[("moving", parts(moving)), ("standing", parts(standing))], count)?;
-        }
+        check_steps(&query.steps, entry.assembly.parts.len())?;
         check_length("wanted", query.wanted)?;
         Ok(clearance::answer(&entry.assembly, query, termination).ok())
+    }
+
+    /// For each of some steps, the fastener that it moves by itself, if it does, and the tools that turn it.
+    ///
+    /// # Errors
+    /// As of [`Self::clearance`].
+    pub fn tools(
+        &self,
+        id: AssemblyId,
+        steps: &[PassingStep],
+        termination: &Termination,
+    ) -> Result<Option<Vec<Option<FastenerTools>>>, ServiceError> {
+        let entry = self.entry(id, termination)?;
+        check_steps(steps, entry.assembly.parts.len())?;
+        Ok(tools::answer(&entry.assembly, steps, termination).ok())
     }
 
     /// How the parts of an assembly stand under gravity in each of some states.
@@ -589,6 +602,13 @@ fn revised_parts(revision: &Revision) -> [(&'static str, Vec<usize>); 2] {
     let replaced = revision.replaced.iter().map(|(part, _)| *part).collect();
     let moved = revision.moved.iter().map(|(part, _)| *part).collect();
     [("replaced", replaced), ("moved", moved)]
+}
+
+fn check_steps(steps: &[PassingStep], count: usize) -> Result<(), ServiceError> {
+    let parts = |of: &[(usize, Pose)]| of.iter().map(|(part, _)| *part).collect();
+    steps.iter().try_for_each(|PassingStep { moving, standing, .. }| {
+        check_parts(&[("moving", parts(moving)), ("standing", parts(standing))], count)
+    })
 }
 
 fn check_parts(named: &Named, count: usize) -> Result<(), ServiceError> {
