@@ -135,6 +135,8 @@ struct NearTriangles {
     segment: u32,
     interval: Interval,
     triangles: [u32; 2],
+    /// Whether this is the distance of the whole stretch, and not that in its middle.
+    is_exact: bool,
 }
 
 struct ApproachSearch<'a> {
@@ -309,7 +311,7 @@ impl<'a> ApproachSearch<'a> {
         let found = if is_exact { found } else { hull_distance(&moving.map(|p| pose * p), &standing) };
         let distance = distance(&found);
         if distance < self.nearest.map_or(self.reach, |nearest| nearest.distance) {
-            self.nearest = Some(NearTriangles { distance, segment, interval, triangles });
+            self.nearest = Some(NearTriangles { distance, segment, interval, triangles, is_exact });
         }
         if is_exact {
             self.done = self.done.min(at_least);
@@ -323,7 +325,7 @@ impl<'a> ApproachSearch<'a> {
 
     fn answer(&self) -> Option<ClosestApproach> {
         let nearest = self.nearest?;
-        let NearTriangles { segment, interval, triangles, .. } = nearest;
+        let NearTriangles { segment, interval, triangles, is_exact, .. } = nearest;
         let surfaces = self.surfaces(segment);
         let [moving, standing] = [0, 1].map(|side| surfaces[side].corners(triangles[side]));
         let between = |share: f64| {
@@ -332,7 +334,7 @@ impl<'a> ApproachSearch<'a> {
         };
         let gap = |share: f64| distance(&between(share));
         // Of two convex bodies of which one is shifted evenly, the distance is a convex function of the shift.
-        let share = if self.turns(segment) { 0.5 } else { least_of_convex(gap) };
+        let share = if is_exact { least_of_convex(gap) } else { 0.5 };
         let ApproachSegment { pair, number, course } = &self.segments[segment as usize];
         let [from, to] = interval.of(course.length);
         let along = from + share * (to - from);
@@ -345,11 +347,6 @@ impl<'a> ApproachSearch<'a> {
             share: if course.length > 0.0 { (along / course.length).clamp(0.0, 1.0) } else { 0.0 },
             points: between(share).points,
         })
-    }
-
-    fn turns(&self, segment: u32) -> bool {
-        let course = &self.segments[segment as usize].course;
-        course.turn(Interval::WHOLE) > 0.0
     }
 
     /// The pose at a share of a stretch.

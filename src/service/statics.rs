@@ -214,7 +214,7 @@ fn is_out(scene: &Scene, standing: &[usize], part: usize, motion: &Pose) -> bool
 }
 
 /// The fastener of each shape, if it is one.
-fn fasteners(assembly: &Assembly) -> Vec<Option<Fastener>> {
+pub(super) fn fasteners(assembly: &Assembly) -> Vec<Option<Fastener>> {
     assembly.shapes.par_iter().map(|shape| Fastener::of(&shape.surface)).collect()
 }
 

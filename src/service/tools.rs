@@ -3,12 +3,13 @@
 use nalgebra::{Unit, Vector3};
 use rayon::prelude::*;
 
-use crate::fasteners::{Drive, Fastener};
+use crate::fasteners::Drive;
 use crate::geometry::{Assembly, Pose, scaled_pose};
 use crate::termination::{Interrupt, Termination};
 use crate::tools::{SurroundingPart, ToolRoom, tool_rooms};
 
 use super::clearance::PassingStep;
+use super::statics::fasteners;
 
 /// A fastener that a step takes off, and the tools for it.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,8 +30,7 @@ pub(super) fn answer(
     steps: &[PassingStep],
     termination: &Termination,
 ) -> Result<Vec<Option<FastenerTools>>, Interrupt> {
-    let fasteners: Vec<Option<Fastener>> =
-        assembly.shapes.par_iter().map(|shape| Fastener::of(&shape.surface)).collect();
+    let fasteners = fasteners(assembly);
     let tools = |step: &PassingStep| {
         let [(part, motion)] = step.moving[..] else { return Ok(None) };
         let Some(fastener) = &fasteners[assembly.parts[part].shape] else { return Ok(None) };

@@ -14,9 +14,9 @@ use crate::termination::{Interrupt, Termination};
 pub enum ToolKind {
     /// A hexagon socket on a ratchet (ISO 2725), which swings where nothing is in its way.
     Socket,
-    /// A flat ring spanner with twelve corners (ISO 10104).
+    /// A flat ring spanner with twelve corners.
     RingSpanner,
-    /// A wrench with an open end at 15° to its handle, which is turned over between two swings (ISO 10102).
+    /// A wrench with an open end at 15° to its handle, which is turned over between two swings.
     OpenEndWrench,
     /// A key for hexagon sockets, its short arm in the socket (ISO 2936).
     HexKey,
@@ -52,11 +52,15 @@ const CORNERS: f64 = 0.6;
 const SOCKET: f64 = 0.75;
 /// The length of a socket with its ratchet, which swings beyond: 25 mm and 35 mm for 10 to 13 mm.
 const SOCKET_LENGTH: f64 = 6.0;
-/// The outer radius of a ring: 0.75 to 0.8 by ISO 10104.
+/// From so far above its place a socket or a ring is lowered: over the ends of bolts, which stick out of their nuts by half of
+/// this. At half, it need not pass what is right above the fastener; at double, a ceiling keeps tools away that can be
+/// brought in under it.
+const LIFTED: f64 = 2.0;
+/// The outer radius of a ring: 0.75 to 0.8 of common makes, less than ISO 3318 allows.
 const RING: f64 = 0.8;
 /// The height of a ring: 0.6 to 0.7.
 const RING_HEIGHT: f64 = 0.65;
-/// Half of the width of a head with an open end: 1.05 to 1.2 by ISO 10102.
+/// Half of the width of a head with an open end: 1.05 to 1.2 of common makes, less than ISO 3318 allows.
 const HEAD: f64 = 1.15;
 /// Its height: 0.45 to 0.55.
 const HEAD_HEIGHT: f64 = 0.5;
@@ -96,14 +100,14 @@ impl Tool {
         let approach = match kind {
             ToolKind::Socket => {
                 add_ring(&mut mesh, [CORNERS, SOCKET], [-0.95 * length, SOCKET_LENGTH - length]);
-                Vector3::z() * SOCKET_LENGTH
+                Vector3::z() * LIFTED
             }
             ToolKind::RingSpanner => {
                 let low = bottom(RING_HEIGHT);
                 add_ring(&mut mesh, [CORNERS, RING], [low, low + RING_HEIGHT]);
                 let middle = low + RING_HEIGHT / 2.0;
                 add_handle(&mut mesh, RING - 0.05, middle);
-                Vector3::z() * (SOCKET_LENGTH / 2.0)
+                Vector3::z() * LIFTED
             }
             ToolKind::OpenEndWrench => {
                 let low = bottom(HEAD_HEIGHT);
