@@ -111,3 +111,18 @@ fn what_cannot_be_asked_is_refused_by_name() {
         assert!(found.status.code() == Some(2) && text.contains(named), "{arguments:?}: {found:?}");
     }
 }
+
+#[test]
+fn what_is_not_certain_is_not_said_to_be_kept() {
+    // All along the thread, the flanks of bolt and nut are equally near: more than can be looked into.
+    let folder = tempfile::tempdir().unwrap();
+    let assembly = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/assemblies/threaded-bolt-and-nut");
+    sbdp(folder.path(), &["plan", assembly, "--embedded", "-q", "--json", "plan.json"]);
+    let found = sbdp(folder.path(), &["clearance", "plan.json", "--at-least", "1", "--json", "-"]);
+    let document: Value = serde_json::from_slice(&found.stdout).unwrap();
+    let pairs = document["steps"][0]["short"].as_array().unwrap();
+    assert_eq!((found.status.code(), pairs.len()), (Some(3), 1), "{document}");
+    let [bound, distance, assembled] =
+        ["at_least", "distance", "assembled"].map(|key| number(&pairs[0][key]));
+    assert!(bound < 0.98 * assembled && bound <= distance, "{document}");
+}

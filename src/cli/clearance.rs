@@ -133,11 +133,12 @@ fn verdict(document: &ClearanceDocument<'_>, wanted: f64) -> String {
     let short = document.steps.iter().flat_map(|step| step.short.iter().map(move |pair| (step.step, pair)));
     let line = |(step, pair): (usize, &PartClearanceDocument<'_>)| {
         format!(
-            "step {}: {} passes {} at {}, as assembled {}\n",
+            "step {}: {} passes {} at {} (certain is {}), as assembled {}\n",
             step + 1,
             pair.moving,
             pair.standing,
             length(pair.distance, units),
+            length(pair.at_least, units),
             length(pair.assembled, units)
         )
     };
@@ -145,6 +146,10 @@ fn verdict(document: &ClearanceDocument<'_>, wanted: f64) -> String {
     if lines.is_empty() {
         format!("All parts keep {}, or what they have as they stand.", length(wanted, units))
     } else {
-        format!("Nearer than {}, and than they stand:\n{}", length(wanted, units), lines.trim_end())
+        format!(
+            "Not certain to keep {}, or what they have as they stand:\n{}",
+            length(wanted, units),
+            lines.trim_end()
+        )
     }
 }

@@ -37,7 +37,8 @@ pub struct PassedPair<'a> {
 pub struct ClosestApproach {
     /// Which of the pairs.
     pub pair: usize,
-    /// The distance there; 0 where the surfaces meet.
+    /// The distance there; 0 where the surfaces meet. Where the search was given up before anything came nearer than what it
+    /// looked for, that length.
     pub distance: f64,
     /// No two surfaces of any pair come nearer than this on their way.
     pub at_least: f64,
@@ -49,7 +50,7 @@ pub struct ClosestApproach {
     pub points: Option<[Point3<f64>; 2]>,
 }
 
-/// Where some parts pass others the nearest, if any comes nearer than `reach`.
+/// Where some parts pass others the nearest, if any comes nearer than `reach`. `None` is certain: nothing does.
 ///
 /// # Errors
 /// The termination condition became true.
@@ -149,6 +150,8 @@ struct ApproachSearch<'a> {
     reach: f64,
     /// The least bound of items that are done.
     done: f64,
+    /// The item at which the search was given up.
+    given_up: Option<Item>,
     termination: &'a Termination,
 }
 
@@ -161,7 +164,17 @@ impl<'a> ApproachSearch<'a> {
     ) -> Self {
         let views = segments.iter().map(|segment| CourseView::new(&segment.course, true, 0.0)).collect();
         let (items, nearest) = (BinaryHeap::new(), None);
-        Self { pairs, segments, views, items, nearest, reach, done: f64::INFINITY, termination }
+        Self {
+            pairs,
+            segments,
+            views,
+            items,
+            nearest,
+            reach,
+            done: f64::INFINITY,
+            given_up: None,
+            termination,
+        }
     }
 
     /// What is no nearer than this is not looked into.
@@ -177,12 +190,13 @@ impl<'a> ApproachSearch<'a> {
         let mut looked_into = 0;
         while let Some(Reverse(item)) = self.items.pop() {
             poll.check()?;
+            if item.at_least >= self.limit() || self.nearest.is_some_and(|n| n.distance <= TOUCHED) {
+                break;
+            }
             looked_into += 1;
             if looked_into > APPROACH_ITEMS {
                 self.done = self.done.min(item.at_least);
-                break;
-            }
-            if item.at_least >= self.limit() || self.nearest.is_some_and(|n| n.distance <= TOUCHED) {
+                self.given_up = Some(item);
                 break;
             }
             self.split(&item)?;
@@ -324,7 +338,7 @@ impl<'a> ApproachSearch<'a> {
     }
 
     fn answer(&self) -> Option<ClosestApproach> {
-        let nearest = self.nearest?;
+        let Some(nearest) = self.nearest else { return self.given_up.map(|item| self.doubtful(&item)) };
         let NearTriangles { segment, interval, triangles, is_exact, .. } = nearest;
         let surfaces = self.surfaces(segment);
         let [moving, standing] = [0, 1].map(|side| surfaces[side].corners(triangles[side]));
@@ -347,6 +361,20 @@ impl<'a> ApproachSearch<'a> {
             share: if course.length > 0.0 { (along / course.length).clamp(0.0, 1.0) } else { 0.0 },
             points: between(share).points,
         })
+    }
+
+    /// Where nothing was found, but something may come nearer than what was looked for.
+    fn doubtful(&self, item: &Item) -> ClosestApproach {
+        let ApproachSegment { pair, number, .. } = &self.segments[item.segment as usize];
+        let [from, to] = item.interval.of(1.0);
+        ClosestApproach {
+            pair: *pair,
+            distance: self.reach,
+            at_least: self.done.min(self.reach),
+            segment: *number,
+            share: (from + to) / 2.0,
+            points: None,
+        }
     }
 
     /// The pose at a share of a stretch.

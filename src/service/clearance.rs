@@ -59,7 +59,7 @@ pub struct StepClearance {
     pub touching: Vec<usize>,
     /// Where the step passes other parts the nearest; its bound is one for all of these. `None` if there are no others.
     pub closest: Option<PartClearance>,
-    /// The pairs of parts that do not keep the distance that is wanted.
+    /// The pairs of parts that do not keep the distance that is wanted, or for which that is not certain.
     pub short: Vec<PartClearance>,
 }
 
@@ -141,7 +141,11 @@ fn step_clearance(
         let alone = std::slice::from_ref(&pair.passed);
         let Some(found) = closest_approach(alone, wanted, termination)? else { continue };
         let assembled = pair.assembled(f64::INFINITY, termination)?.unwrap_or(f64::INFINITY);
-        if found.distance < wanted.min(assembled) * (1.0 - APPROACH_PRECISION) {
+        let kept = wanted.min(assembled);
+        // The bound is below the distance by the precision, and the distance off by it where they turn.
+        let is_kept = found.distance >= kept * (1.0 - APPROACH_PRECISION)
+            && found.at_least >= kept * (1.0 - 2.0 * APPROACH_PRECISION);
+        if !is_kept {
             short.push(pair.described(&found, assembled, scale));
         }
     }
