@@ -363,7 +363,7 @@ impl<'a> ApproachSearch<'a> {
         })
     }
 
-    /// Where nothing was found, but something may come nearer than what was looked for.
+    /// The answer of a search that was given up before it found a distance below `reach`: the bound is lower than that.
     fn doubtful(&self, item: &Item) -> ClosestApproach {
         let ApproachSegment { pair, number, .. } = &self.segments[item.segment as usize];
         let [from, to] = item.interval.of(1.0);

@@ -19,9 +19,11 @@ use crate::tolerances::TOOL_GAP;
 use shapes::Tool;
 pub use shapes::ToolKind;
 
-/// Arcs around a fastener that are tested as wholes: 5° each.
+/// Arcs around a fastener that are tested as wholes: 5° each, a sixth of what a wrench has to swing by. At half, a run is
+/// found only where it has a whole arc of 10°; at double, it takes twice as long.
 const ARCS: usize = 72;
-/// Pieces of the arcs at the ends of what is free: 0.5° each, a tenth of an arc.
+/// Pieces of the arcs at the ends of what is free: 0.5° each. At half, swings are too small by up to 2° and not 1°; at
+/// double, nobody sees the difference.
 const ARC_PIECES: usize = 10;
 
 /// A part that stands around a fastener.

@@ -14,7 +14,7 @@ pub(in crate::cli) struct ClearanceArguments {
     /// Its assembly [default: the one that the plan names]
     #[arg(long, value_name = "ASSEMBLY")]
     pub(in crate::cli) meshes: Option<PathBuf>,
-    /// Report what comes nearer than this, in the input's units, and exit with 3 if anything does. Parts that are nearer to
+    /// Report what comes nearer than this (input's units), or is not certain not to, and exit with 3 if anything does. Parts that are nearer to
     /// each other as they stand only have to keep what they have
     #[arg(long, value_name = "LENGTH", value_parser = not_negative, allow_negative_numbers = true)]
     pub(in crate::cli) at_least: Option<f64>,
