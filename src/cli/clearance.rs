@@ -8,7 +8,7 @@ use super::args::ClearanceArguments;
 use super::error::CliError;
 use super::subject::Subject;
 use super::table::{TextTable, length, listed};
-use super::{interrupt, print, written_as_json};
+use super::{interrupt, show};
 use crate::document::PlanDocument;
 use crate::search::Termination;
 use crate::service::{ClearanceQuery, PartClearance, StepClearance};
@@ -59,12 +59,7 @@ pub(super) fn run(arguments: &ClearanceArguments) -> Result<ExitCode, CliError> 
     let document = document(&subject.plan, &found, arguments.at_least);
     let is_kept = document.steps.iter().all(|step| step.short.is_empty());
     let exit_code = if is_kept { ExitCode::SUCCESS } else { ExitCode::from(NOT_KEPT) };
-    if let Some(file) = &arguments.json
-        && written_as_json(file, &document, "clearances")?
-    {
-        return Ok(exit_code);
-    }
-    print(&table(&document))?;
+    show(arguments.json.as_deref(), &document, "clearances", || table(&document))?;
     Ok(exit_code)
 }
 

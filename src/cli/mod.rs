@@ -96,6 +96,19 @@ fn written_as_json(file: &Path, document: &impl serde::Serialize, what: &str) ->
     Ok(is_stdout)
 }
 
+/// Writes a document as JSON if a file is named, and as text to stdout unless the JSON went there.
+fn show(
+    json: Option<&Path>,
+    document: &impl serde::Serialize,
+    what: &str,
+    text: impl FnOnce() -> String,
+) -> Result<(), CliError> {
+    match json {
+        Some(file) if written_as_json(file, document, what)? => Ok(()),
+        _ => print(&text()),
+    }
+}
+
 /// Writes a file whole.
 fn written(file: &Path, bytes: &[u8]) -> Result<(), CliError> {
     std::fs::write(file, bytes).map_err(|e| CliError::Failed(format!("{}: {e}", file.display())))

@@ -10,7 +10,7 @@ use super::args::ScheduleArguments;
 use super::error::CliError;
 use super::standing::{StandingPlan, check_order_is_free};
 use super::table::TextTable;
-use super::{interrupt, print, written_as_json};
+use super::{interrupt, show};
 use crate::document::{PlanDocument, StepDocument};
 use crate::files::metres;
 use crate::geometry::{Assembly, Bounds, Pose, interpolate, pose_from_waypoint, transformed};
@@ -84,12 +84,7 @@ pub(super) fn run(arguments: &ScheduleArguments) -> Result<ExitCode, CliError> {
         }
     };
     let document = document(&plan, &found, &operations, arms, times);
-    if let Some(file) = &arguments.json
-        && written_as_json(file, &document, "schedule")?
-    {
-        return Ok(ExitCode::SUCCESS);
-    }
-    print(&table(&document, &plan))?;
+    show(arguments.json.as_deref(), &document, "schedule", || table(&document, &plan))?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -8,7 +8,7 @@ use super::args::StaticsArguments;
 use super::error::CliError;
 use super::standing::{StandingPlan, check_order_is_free};
 use super::table::{TextTable, listed};
-use super::{interrupt, print, written, written_as_json};
+use super::{interrupt, show, written};
 use crate::document::{PlanDocument, StepDocument};
 use crate::geometry::pose_from_waypoint;
 use crate::search::Termination;
@@ -99,13 +99,8 @@ pub(super) fn run(arguments: &StaticsArguments) -> Result<ExitCode, CliError> {
             .map(|(after, (state, found))| described(after, state, found, name))
             .collect(),
     };
-    if let Some(file) = &arguments.json
-        && written_as_json(file, &document, "states")?
-    {
-        return Ok(ExitCode::SUCCESS);
-    }
-    print(&table(plan, &document))?;
-    print(&format!("\n{}\n", hands(&answer.states)))?;
+    let text = || format!("{}\n{}\n", table(plan, &document), hands(&answer.states));
+    show(arguments.json.as_deref(), &document, "states", text)?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -8,7 +8,7 @@ use super::args::ToolsArguments;
 use super::error::CliError;
 use super::subject::Subject;
 use super::table::{TextTable, length, listed};
-use super::{interrupt, print, written_as_json};
+use super::{interrupt, show};
 use crate::fasteners::Drive;
 use crate::search::Termination;
 use crate::service::FastenerTools;
@@ -61,12 +61,7 @@ pub(super) fn run(arguments: &ToolsArguments) -> Result<ExitCode, CliError> {
     let has_tool = |step: &FastenerDocument<'_>| step.tools.iter().any(|tool| tool.fits);
     let is_missing = arguments.required && !document.steps.iter().all(has_tool);
     let exit_code = if is_missing { ExitCode::from(NO_TOOL) } else { ExitCode::SUCCESS };
-    if let Some(file) = &arguments.json
-        && written_as_json(file, &document, "tools")?
-    {
-        return Ok(exit_code);
-    }
-    print(&table(&document))?;
+    show(arguments.json.as_deref(), &document, "tools", || table(&document))?;
     Ok(exit_code)
 }
 
