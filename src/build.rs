@@ -12,7 +12,7 @@ use std::{env, fs, io};
 
 /// Every stage, and the stages that its code imports. A stage comes after all that it depends on.
 /// `.ci/structure` compares this table with the imports.
-const STAGES: [(&str, &str); 23] = [
+const STAGES: [(&str, &str); 25] = [
     ("lru", ""),
     ("termination", ""),
     ("tolerances", ""),
@@ -41,9 +41,11 @@ const STAGES: [(&str, &str); 23] = [
         "service",
         "assembling blocking_graph cache contact fasteners geometry lru plan scene sdf search simulation statics termination tolerances tools",
     ),
+    ("document", "files geometry ipc plan"),
+    ("report", "document geometry ipc plan service statics termination tools"),
     (
         "daemon",
-        "blocking_graph cache config files geometry ipc lru plan search service simulation termination",
+        "blocking_graph cache config files geometry ipc lru plan report search service simulation termination",
     ),
 ];
 

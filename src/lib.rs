@@ -68,6 +68,7 @@ pub mod geometry;
 pub mod hostile_input;
 mod lru;
 pub mod plan;
+pub mod report;
 mod rrt;
 pub mod scene;
 pub mod schedule;

@@ -2,11 +2,18 @@
 //! described in `src/document/JSON.md`. Parts go by their names. Later versions may add fields; those that
 //! are here keep their meaning.
 
+mod report;
+
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
 use crate::plan::Waypoint;
+
+pub use report::{
+    ClearanceDocument, ClosestDocument, FallDocument, PartNames, StabilityDocument, ToolDocument,
+    UnstableDocument,
+};
 
 /// The name and version of the contract.
 pub const SCHEMA: &str = "sbdp-plan/2";
@@ -117,6 +124,9 @@ pub struct InitialDocument {
     pub removed: Vec<String>,
     /// Parts that stood elsewhere, and where. In an assembly plan also those that waited for their turn.
     pub poses: BTreeMap<String, Waypoint>,
+    /// How the parts stand before the first step, if the request asks for it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stability: Option<StabilityDocument>,
 }
 
 /// Parts that move as one rigid body.
@@ -146,6 +156,15 @@ pub struct StepDocument {
     /// The unit vector along which the middle of the part's box moves on the last leg of the path; null where it does
     /// not.
     pub direction: Option<[f64; 3]>,
+    /// How the parts that are in the assembly after the step stand, if the request asks for it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stability: Option<StabilityDocument>,
+    /// How near the step passes other parts, if the request asks for it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clearance: Option<ClearanceDocument>,
+    /// The tools for the fastener that the step takes off, if the request asks for them; none if it takes no fastener off.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tools: Option<Vec<ToolDocument>>,
 }
 
 /// Parts that can begin to move together where nothing leaves.

@@ -35,6 +35,12 @@ pub const PLAN_TRACE: u32 = 128;
 pub const PLAN_HAS_CLEARANCE: u32 = 256;
 /// The header's `up` is given.
 pub const PLAN_HAS_UP: u32 = 512;
+/// Report how the parts stand before the first step and after each step.
+pub const PLAN_REPORT_STABILITY: u32 = 1024;
+/// Report how near each step passes other parts.
+pub const PLAN_REPORT_CLEARANCE: u32 = 2048;
+/// Report which tools turn the fasteners that the steps take off.
+pub const PLAN_REPORT_TOOLS: u32 = 4096;
 
 /// Names of the planners; the wire carries the index.
 pub const PLANNERS: [&str; 7] = ["sbdp-star", "sbdp", "pdp-t", "pdp-r", "pdp-star", "rrt", "bk-rrt"];
@@ -79,7 +85,8 @@ pub struct PlanRequestHeader {
     /// Index into [`ACTION_SETS`].
     pub actions: u32,
     /// [`PLAN_NO_CACHE`], [`PLAN_HAS_TARGETS`], [`PLAN_SWEEPS`], [`PLAN_NO_SWEEPS`], [`PLAN_BATCH`],
-    /// [`PLAN_ASSEMBLY`], [`PLAN_NO_STAGING`], [`PLAN_TRACE`], [`PLAN_HAS_CLEARANCE`], [`PLAN_HAS_UP`].
+    /// [`PLAN_ASSEMBLY`], [`PLAN_NO_STAGING`], [`PLAN_TRACE`], [`PLAN_HAS_CLEARANCE`], [`PLAN_HAS_UP`],
+    /// [`PLAN_REPORT_STABILITY`], [`PLAN_REPORT_CLEARANCE`], [`PLAN_REPORT_TOOLS`].
     pub flags: u32,
     /// Threads for this request; 0 leaves it to the daemon.
     pub threads: u32,
@@ -120,6 +127,10 @@ pub struct PlanRequestHeader {
     pub clearance: f64,
     /// The direction up, in the input's frame, of any length but 0; ignored without [`PLAN_HAS_UP`].
     pub up: [f64; 3],
+    /// The coefficient of friction of all contacts, from 0 up; 0 without [`PLAN_REPORT_STABILITY`].
+    pub friction: f64,
+    /// The direction against gravity, in the input's frame, of any length but 0; 0 without [`PLAN_REPORT_STABILITY`].
+    pub against_gravity: [f64; 3],
 }
 
 /// A parameter of the engine `penalty`.
@@ -199,12 +210,12 @@ pub struct StepsHeader {
 }
 
 const _: () = {
-    assert!(size_of::<PlanRequestHeader>() == 168 && align_of::<PlanRequestHeader>() == 8);
+    assert!(size_of::<PlanRequestHeader>() == 200 && align_of::<PlanRequestHeader>() == 8);
     assert!(offset_of!(PlanRequestHeader, planner) == 32);
     assert!(offset_of!(PlanRequestHeader, moved) == 68);
     assert!(offset_of!(PlanRequestHeader, static_analysis) == 76);
     assert!(offset_of!(PlanRequestHeader, deadline_ns) == 96);
-    assert!(offset_of!(PlanRequestHeader, up) == 144);
+    assert!(offset_of!(PlanRequestHeader, up) == 144 && offset_of!(PlanRequestHeader, friction) == 168);
     assert!(size_of::<PenaltyRecord>() == 16 && offset_of!(PenaltyRecord, value) == 8);
     assert!(size_of::<MovedPart>() == 64 && offset_of!(MovedPart, motion) == 8);
     assert!(size_of::<StepRecord>() == 72 && align_of::<StepRecord>() == 8);
@@ -224,6 +235,36 @@ pub enum Staging {
     /// Laid out beside the assembly, except for these.
     Beside(Vec<MovedPart>),
 }
+
+/// What to report about each step of a plan besides its path.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Reports {
+    /// How the parts stand, if wanted.
+    pub stability: Option<Gravity>,
+    /// How near it passes other parts.
+    pub clearance: bool,
+    /// Which tools turn the fastener that it takes off.
+    pub tools: bool,
+}
+
+/// What it depends on how parts stand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gravity {
+    /// The direction against gravity, in the input's frame, of any length but 0.
+    pub up: [f64; 3],
+    /// The coefficient of friction of all contacts, from 0 up.
+    pub friction: f64,
+}
+
+impl Default for Gravity {
+    /// Up is +z, and dry machined steel at the lower end slides.
+    fn default() -> Self {
+        Self { up: [0.0, 0.0, 1.0], friction: FRICTION }
+    }
+}
+
+/// The coefficient of friction where none is given: dry machined steel at the lower end; 0.05 is oiled steel, 0.5 rubber.
+pub const FRICTION: f64 = 0.2;
 
 /// A plan request, owned.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -282,6 +323,8 @@ pub struct PlanRequest {
     pub moved: Vec<MovedPart>,
     /// Make an assembly plan, with parts that begin there.
     pub assembly: Option<Staging>,
+    /// What to report about each step.
+    pub reports: Reports,
 }
 
 impl PlanRequest {
@@ -305,6 +348,9 @@ impl PlanRequest {
                 | flag(self.trace, PLAN_TRACE)
                 | flag(self.clearance.is_some(), PLAN_HAS_CLEARANCE)
                 | flag(self.up.is_some(), PLAN_HAS_UP)
+                | flag(self.reports.stability.is_some(), PLAN_REPORT_STABILITY)
+                | flag(self.reports.clearance, PLAN_REPORT_CLEARANCE)
+                | flag(self.reports.tools, PLAN_REPORT_TOOLS)
                 | flag(self.targets.is_some(), PLAN_HAS_TARGETS)
                 | flag(self.assembly.is_some(), PLAN_ASSEMBLY)
                 | flag(matches!(self.assembly, Some(Staging::None)), PLAN_NO_STAGING)
@@ -328,6 +374,8 @@ impl PlanRequest {
             seed: self.seed,
             clearance: self.clearance.unwrap_or(0.0),
             up: self.up.unwrap_or_default(),
+            friction: self.reports.stability.map_or(0.0, |gravity| gravity.friction),
+            against_gravity: self.reports.stability.map_or([0.0; 3], |gravity| gravity.up),
         });
         let sizes: Vec<u32> = self.groups.iter().map(|group| group.len() as u32).collect();
         writer.array(&self.fixed).array(&self.removed).array(targets).array(&self.base).array(&self.keep);
@@ -369,7 +417,10 @@ impl PlanRequest {
             | PLAN_NO_STAGING
             | PLAN_TRACE
             | PLAN_HAS_CLEARANCE
-            | PLAN_HAS_UP;
+            | PLAN_HAS_UP
+            | PLAN_REPORT_STABILITY
+            | PLAN_REPORT_CLEARANCE
+            | PLAN_REPORT_TOOLS;
         let limit = |value: u64| (value != u64::MAX).then_some(value);
         let set = |bit: u32| h.flags & bit != 0;
         let astray = (set(PLAN_NO_STAGING) || !staged.is_empty()) && !set(PLAN_ASSEMBLY);
@@ -408,6 +459,12 @@ impl PlanRequest {
             } else {
                 Staging::Beside(staged)
             }),
+            reports: Reports {
+                stability: set(PLAN_REPORT_STABILITY)
+                    .then_some(Gravity { up: h.against_gravity, friction: h.friction }),
+                clearance: set(PLAN_REPORT_CLEARANCE),
+                tools: set(PLAN_REPORT_TOOLS),
+            },
         })
     }
 }

@@ -1,9 +1,12 @@
 //! The summary that ends a plan: everything but its steps.
 
+pub mod report;
+
 use bytemuck::{Pod, Zeroable};
 
 use crate::bytes::{Malformed, Reader, Text, TextWriter, Texts, Writer};
 use crate::plan::{MovedPart, check_range, slice_of};
+use report::{Report, ReportSections, ReportView};
 
 /// Names of the plan statuses; the wire carries the index.
 pub const STATUSES: [&str; 6] = ["complete", "partial", "infeasible", "timeout", "cancelled", "exhausted"];
@@ -18,6 +21,13 @@ pub const SUMMARY_HAS_TARGETS: u32 = 4;
 pub const SUMMARY_ASSEMBLY: u32 = 8;
 /// The daemon chose the base, and the reason is given.
 pub const SUMMARY_HAS_BASE_REASON: u32 = 16;
+/// How the parts stand is reported: there is a [`StabilityRecord`](report::StabilityRecord) for the state before the first
+/// step, and one for the state after each step.
+pub const SUMMARY_HAS_STABILITY: u32 = 32;
+/// How near parts pass each other is reported: there is a [`ClearanceRecord`](report::ClearanceRecord) for each step.
+pub const SUMMARY_HAS_CLEARANCE: u32 = 64;
+/// The tools are reported: there is a [`FastenerRecord`](report::FastenerRecord) for each step.
+pub const SUMMARY_HAS_TOOLS: u32 = 128;
 
 /// A warning about the assembly as a whole, not about a part.
 pub const NO_PART: u32 = u32::MAX;
@@ -63,7 +73,7 @@ pub struct SummaryHeader {
     /// Index into [`STATUSES`].
     pub status: u32,
     /// [`SUMMARY_HAS_REASON`], [`SUMMARY_HAS_UNITS`], [`SUMMARY_HAS_TARGETS`], [`SUMMARY_ASSEMBLY`],
-    /// [`SUMMARY_HAS_BASE_REASON`].
+    /// [`SUMMARY_HAS_BASE_REASON`], [`SUMMARY_HAS_STABILITY`], [`SUMMARY_HAS_CLEARANCE`], [`SUMMARY_HAS_TOOLS`].
     pub flags: u32,
     /// How many steps were sent.
     pub steps: u32,
@@ -99,6 +109,22 @@ pub struct SummaryHeader {
     pub group_parts: u32,
     /// How many parts were to be kept (u32).
     pub keep: u32,
+    /// How many states follow ([`StabilityRecord`](report::StabilityRecord)).
+    pub states: u32,
+    /// How many groups of connected parts fall in part ([`UnstableRecord`](report::UnstableRecord)).
+    pub unstable: u32,
+    /// How many parts fall ([`FallRecord`](report::FallRecord)).
+    pub falls: u32,
+    /// How many sets of parts to hold follow ([`HoldRecord`](report::HoldRecord)).
+    pub holds: u32,
+    /// How many steps follow with their clearance ([`ClearanceRecord`](report::ClearanceRecord)).
+    pub clearances: u32,
+    /// How many steps follow with their fastener ([`FastenerRecord`](report::FastenerRecord)).
+    pub fasteners: u32,
+    /// How many tools follow ([`ToolRecord`](report::ToolRecord)).
+    pub tools: u32,
+    /// How many numbers of parts follow, to which the records of the report point (u32).
+    pub report_parts: u32,
     /// Reserved, 0.
     pub reserved: u32,
     /// Why the plan is not complete; empty without [`SUMMARY_HAS_REASON`].
@@ -162,9 +188,9 @@ pub struct WarningRecord {
 }
 
 const _: () = {
-    assert!(size_of::<Stats>() == 112 && size_of::<SummaryHeader>() == 232);
-    assert!(std::mem::offset_of!(SummaryHeader, reason) == 80);
-    assert!(std::mem::offset_of!(SummaryHeader, stats) == 120);
+    assert!(size_of::<Stats>() == 112 && size_of::<SummaryHeader>() == 264);
+    assert!(std::mem::offset_of!(SummaryHeader, reason) == 112);
+    assert!(std::mem::offset_of!(SummaryHeader, stats) == 152);
     assert!(size_of::<GroupRecord>() == 32 && std::mem::offset_of!(GroupRecord, direction) == 8);
     assert!(size_of::<OverlapRecord>() == 16 && size_of::<BlockedRecord>() == 20);
     assert!(size_of::<WarningRecord>() == 12);
@@ -233,6 +259,8 @@ pub struct SummaryParts<'a> {
     pub free_together: Vec<(Vec<u32>, [f64; 3])>,
     /// Parts that did not begin where their mesh was given, and where they began: the rigid motion of the mesh.
     pub poses: Vec<MovedPart>,
+    /// What the plan means where it is carried out, if the request asks for it.
+    pub report: Option<Report>,
     /// Counters and times.
     pub stats: Stats,
 }
@@ -281,7 +309,6 @@ impl SummaryParts<'_> {
             free_together: free.len() as u32,
             group_parts: group_parts.len() as u32,
             keep: self.keep.len() as u32,
-            reserved: 0,
             reason: texts.add(self.reason.unwrap_or("")),
             planner: texts.add(self.planner),
             engine: texts.add(self.engine),
@@ -289,12 +316,20 @@ impl SummaryParts<'_> {
             base_reason: texts.add(self.base.1.unwrap_or("")),
             text_bytes: texts.bytes().len() as u32,
             stats: self.stats,
+            ..SummaryHeader::default()
         };
+        let report = self.report.as_ref().map(ReportSections::of).unwrap_or_default();
         let mut writer = Writer::default();
-        writer.value(header).array(&names).array(&self.overlaps).array(&blocked).array(&warnings);
+        writer
+            .value(report.counted(header))
+            .array(&names)
+            .array(&self.overlaps)
+            .array(&blocked)
+            .array(&warnings);
         writer.array(&self.removed).array(targets).array(&self.fixed).array(&self.keep);
         writer.array(&self.base.0).array(&self.remaining);
         writer.array(&blockers).array(&self.poses).array(&kept).array(&free).array(&group_parts);
+        report.write(&mut writer);
         writer.array(texts.bytes());
         writer.finish()
     }
@@ -305,6 +340,7 @@ impl SummaryParts<'_> {
             | flag(self.units.is_some(), SUMMARY_HAS_UNITS)
             | flag(self.targets.is_some(), SUMMARY_HAS_TARGETS)
             | flag(self.base.1.is_some(), SUMMARY_HAS_BASE_REASON)
+            | self.report.as_ref().map_or(0, Report::flags)
             | flag(self.assembly, SUMMARY_ASSEMBLY)
     }
 }
@@ -329,6 +365,7 @@ pub struct SummaryView<'a> {
     free_together: &'a [GroupRecord],
     group_parts: &'a [u32],
     texts: Texts<'a>,
+    report: ReportView<'a>,
 }
 
 impl<'a> SummaryView<'a> {
@@ -356,6 +393,7 @@ impl<'a> SummaryView<'a> {
             kept_together: reader.array("kept together", u64::from(header.kept_together))?,
             free_together: reader.array("free together", u64::from(header.free_together))?,
             group_parts: reader.array("parts of groups", u64::from(header.group_parts))?,
+            report: ReportView::read(&mut reader, &header)?,
             texts: Texts(reader.array("texts", u64::from(header.text_bytes))?),
         };
         view.check()?;
@@ -542,6 +580,12 @@ impl<'a> SummaryView<'a> {
         self.warnings
             .iter()
             .map(|w| ((w.part != NO_PART).then_some(w.part), self.texts.get_checked(w.message)))
+    }
+
+    /// What the plan means where it is carried out, as far as the request asks for it.
+    #[must_use]
+    pub fn report(&self) -> ReportView<'a> {
+        self.report
     }
 
     /// Counters and times.

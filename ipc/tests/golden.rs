@@ -1,4 +1,4 @@
-//! The bytes of every message of protocol 8, written down once. A change to one of them breaks clients that
+//! The bytes of every message of the protocol, written down once. A change to one of them breaks clients that
 //! are out there: a new layout needs a new version in the service names.
 
 use sbdp_ipc::PROTOCOL;
@@ -8,11 +8,12 @@ use sbdp_ipc::geometry::{Assembly, HandleResponse, Part, Vertices};
 use sbdp_ipc::headers::{RequestHeader, RequestKind, ResponseHeader, ResponseKind};
 use sbdp_ipc::layout;
 use sbdp_ipc::plan::{
-    MovedPart, PenaltyRecord, PlanRequest, Staging, Step, StepEnd, StepsView, encode_steps,
+    Gravity, MovedPart, PenaltyRecord, PlanRequest, Reports, Staging, Step, StepEnd, StepsView, encode_steps,
 };
 use sbdp_ipc::progress::{ProgressSample, STAGE_SEARCH, TRIED_TURNS};
 use sbdp_ipc::revision::Revision;
 use sbdp_ipc::status::{Status, StatusHeader};
+use sbdp_ipc::summary::report::{Clearance, Closest, Fastener, Report, Stability, Tool, Unstable};
 use sbdp_ipc::summary::{NO_PART, OverlapRecord, Stats, SummaryParts, SummaryView};
 
 /// Words of eight bytes in hexadecimal, one per line of eight; `*N` after a word repeats it.
@@ -94,12 +95,12 @@ fn numbers_of_kinds_and_codes_and_names_of_services() {
     assert_eq!((ErrorCode::Busy as u32, ErrorCode::Cancelled as u32), (3, 12));
     assert_eq!(
         (PROTOCOL, layout::PLAN_SERVICE, layout::GEOMETRY_SERVICE),
-        (9, "sbdp/v9/plan", "sbdp/v9/geometry")
+        (10, "sbdp/v10/plan", "sbdp/v10/geometry")
     );
-    assert_eq!(layout::PROGRESS_SERVICE, "sbdp/v9/progress");
+    assert_eq!(layout::PROGRESS_SERVICE, "sbdp/v10/progress");
     assert_eq!(
         (layout::WAKE_SERVER_SERVICE, layout::WAKE_CLIENT_SERVICE),
-        ("sbdp/v9/wake/server", "sbdp/v9/wake/client")
+        ("sbdp/v10/wake/server", "sbdp/v10/wake/client")
     );
 }
 
@@ -132,14 +133,20 @@ fn a_plan_request() {
         groups: vec![vec![1, 2], vec![9, 10, 11]],
         moved: vec![MovedPart { part: 7, reserved: 0, motion: POSE }],
         assembly: None,
+        reports: Reports {
+            stability: Some(Gravity { up: [0.0, 0.0, 2.0], friction: 0.25 }),
+            clearance: true,
+            tools: true,
+        },
     };
     check(
         "plan request",
         &request.encode(),
         "\
-         abababababababab*4 0100000001000000 0100000097030000 0400000003000000 0100000002000000 \
+         abababababababab*4 0100000001000000 01000000971f0000 0400000003000000 0100000002000000 \
          0100000001000000 0000000001000000 0100000002000000 0200000000000000 0403020100000000 0900000000000000 0a00000000000000 \
          0b00000000000000 0c00000000000000 000000000000f03f 0000000000000000 000000000000f0bf 000000000000e03f \
+         000000000000d03f 0000000000000000*2 0000000000000040 \
          0100000002000000 0300000000000000 0400000000000000 0500000006000000 0800000000000000 090000000a000000 \
          0200000003000000 0100000002000000 090000000a000000 0b00000000000000 0700000000000000 000000000000f03f 0000000000000040 000000000000e0bf 000000000000f03f \
          0000000000000000*3 0200000000000000 000000000000e03f",
@@ -148,7 +155,7 @@ fn a_plan_request() {
     check(
         "plain plan request",
         &PlanRequest::default().encode(),
-        "0000000000000000*13 ffffffffffffffff*3 0000000000000000*5",
+        "0000000000000000*13 ffffffffffffffff*3 0000000000000000*9",
     );
 }
 
@@ -161,14 +168,14 @@ fn a_request_for_an_assembly_plan() {
         &request.encode(),
         "\
          0000000000000000*5 0000000020000000 0000000000000000*3 0100000000000000 0000000000000000*3 \
-         ffffffffffffffff*3 0000000000000000*5 0700000000000000 000000000000f03f 0000000000000040 \
+         ffffffffffffffff*3 0000000000000000*9 0700000000000000 000000000000f03f 0000000000000040 \
          000000000000e0bf 000000000000f03f 0000000000000000*3",
     );
     let request = PlanRequest { assembly: Some(Staging::None), ..PlanRequest::default() };
     check(
         "assembly plan request without staging",
         &request.encode(),
-        "0000000000000000*5 0000000060000000 0000000000000000*7 ffffffffffffffff*3 0000000000000000*5",
+        "0000000000000000*5 0000000060000000 0000000000000000*7 ffffffffffffffff*3 0000000000000000*9",
     );
 }
 
@@ -223,6 +230,44 @@ fn a_summary() {
         kept_together: vec![vec![0, 1]],
         free_together: vec![(vec![1], [0.0, 0.0, 1.0])],
         poses: vec![MovedPart { part: 1, reserved: 0, motion: POSE }],
+        report: Some(Report {
+            stability: Some(vec![
+                Stability { needs_friction: 0.25, ..Stability::default() },
+                Stability {
+                    unstable: vec![Unstable {
+                        falls: vec![(0, [0.0, 0.0, -1.0])],
+                        hold: vec![vec![0], vec![0, 1]],
+                        needs_clamping: true,
+                    }],
+                    unknown: vec![1],
+                    ..Stability::default()
+                },
+                Stability::default(),
+            ]),
+            clearance: Some(vec![
+                Clearance {
+                    touching: vec![1],
+                    closest: Some(Closest {
+                        moving: 0,
+                        standing: 1,
+                        distance: 0.5,
+                        at_least: 0.25,
+                        assembled: 2.0,
+                        segment: 3,
+                        share: 0.5,
+                        points: Some([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]),
+                    }),
+                },
+                Clearance::default(),
+            ]),
+            tools: Some(vec![
+                None,
+                Some(Fastener {
+                    size: 13.0,
+                    tools: vec![Tool { tool: 2, swing: 60.0, needs: 30.0, fits: true, blocked_by: vec![1] }],
+                }),
+            ]),
+        }),
         stats: Stats {
             simulations: 1,
             simulations_run: 2,
@@ -245,9 +290,9 @@ fn a_summary() {
         "summary",
         &bytes,
         "\
-         020000001f000000 0200000002000000 0100000001000000*2 0100000000000000 0100000001000000 \
-         1000000001000000 0100000001000000 0100000003000000 0100000000000000 0600000003000000 0900000001000000 0a00000001000000 \
-         0b00000002000000 0d00000003000000 \
+         02000000ff000000 0200000002000000 0100000001000000*2 0100000000000000 0100000001000000 \
+         1000000001000000 0100000001000000 0100000003000000*2 0100000001000000 0200000002000000 0200000001000000 \
+         0600000000000000 0600000003000000 0900000001000000 0a00000001000000 0b00000002000000 0d00000003000000 \
          0100000000000000 0200000000000000 0300000000000000 0400000000000000 000000000000e03f*5 \
          0500000000000000 0600000000000000 0800000000000000 0700000000000000 0100000000000000 \
          0000000001000000 \
@@ -256,7 +301,14 @@ fn a_summary() {
          0000000000000000 0100000000000000 0000000000000000 0100000000000000 000000000000f03f 0000000000000040 000000000000e0bf \
          000000000000f03f 0000000000000000*3 \
          0000000002000000 0000000000000000*3 0200000001000000 0000000000000000*2 000000000000f03f \
-         0000000001000000 0100000000000000 6162632b78777768 7970656d6d626967",
+         0000000001000000 0100000000000000 \
+         000000000000d03f 0000000000000000*3 0000000001000000 0300000001000000 0000000000000000 0100000000000000 0400000000000000 \
+         0000000001000000 0000000002000000 0100000000000000 0000000000000000*3 000000000000f0bf 0000000001000000 0100000002000000 \
+         0300000000000000 0100000003000000 0400000001000000 000000000000e03f 000000000000d03f 0000000000000040 000000000000e03f \
+         000000000000f03f 0000000000000040 0000000000000840 0000000000001040 0000000000001440 0000000000001840 \
+         00000000ffffffff ffffffff00000000 0500000000000000 0000000000000000*12 0000000001000000 0000000000002a40 \
+         0200000001000000 0500000001000000 0000000000004e40 0000000000003e40 0000000000000000 0100000001000000*2 \
+         6162632b78777768 7970656d6d626967",
     );
     assert_eq!(SummaryView::new(AlignedBytes::copy_of(&bytes).as_slice()).unwrap().reason(), Some("why"));
 }

@@ -10,6 +10,7 @@ use sbdp_ipc::plan::{
 };
 use sbdp_ipc::revision::Revision;
 use sbdp_ipc::status::{Status, StatusHeader};
+use sbdp_ipc::summary::report::{Clearance, Closest, Fastener, Report, Stability, Tool, Unstable};
 use sbdp_ipc::summary::{NO_PART, OverlapRecord, Stats, SummaryParts, SummaryView};
 
 /// Reads everything that a view offers.
@@ -73,6 +74,44 @@ fn summary() -> Vec<u8> {
         kept_together: vec![vec![0, 2], vec![1, 2]],
         free_together: vec![(vec![0, 1], [0.0, 0.6, 0.8])],
         poses: vec![moved_part()],
+        report: Some(Report {
+            stability: Some(vec![
+                Stability { needs_friction: 0.25, ..Stability::default() },
+                Stability {
+                    unstable: vec![Unstable {
+                        falls: vec![(0, [0.0, 0.0, -1.0])],
+                        hold: vec![vec![0], vec![0, 1]],
+                        needs_clamping: true,
+                    }],
+                    unknown: vec![1],
+                    ..Stability::default()
+                },
+                Stability::default(),
+            ]),
+            clearance: Some(vec![
+                Clearance {
+                    touching: vec![1],
+                    closest: Some(Closest {
+                        moving: 0,
+                        standing: 1,
+                        distance: 0.5,
+                        at_least: 0.25,
+                        assembled: 2.0,
+                        segment: 3,
+                        share: 0.5,
+                        points: Some([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]),
+                    }),
+                },
+                Clearance::default(),
+            ]),
+            tools: Some(vec![
+                None,
+                Some(Fastener {
+                    size: 13.0,
+                    tools: vec![Tool { tool: 2, swing: 60.0, needs: 30.0, fits: true, blocked_by: vec![1] }],
+                }),
+            ]),
+        }),
         stats: Stats { simulations: 7, total_time_s: 1.5, plan_hit: 1, ..Stats::default() },
     }
     .encode()

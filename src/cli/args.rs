@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use nalgebra::UnitQuaternion;
+use sbdp_ipc::plan::FRICTION;
 
 use crate::blocking_graph::StaticAnalysis;
 use crate::geometry::Waypoint;
@@ -20,7 +21,7 @@ mod through_daemon;
 mod tools;
 mod view;
 
-use poses::{direction, moved, rotation};
+use poses::{direction, moved, not_negative, rotation};
 
 pub(super) use bench::{BenchArguments, BenchCommand, BenchReport, BenchRun, BenchScale, BenchUnit};
 pub(super) use clearance::ClearanceArguments;
@@ -157,6 +158,13 @@ pub(super) struct PlanArguments {
     /// Groups that leave together, to be taken apart afterwards
     #[arg(long, value_enum, default_value_t, help_heading = WHAT)]
     pub(super) groups: GroupsArgument,
+    /// What to report about each step of the plan besides its path (repeatable, or separated by commas)
+    #[arg(long, value_enum, value_name = "WHAT", value_delimiter = ',', help_heading = WHAT)]
+    pub(super) report: Vec<ReportArgument>,
+    /// With `--report stability`: the coefficient of friction of all contacts. 0.2 is dry machined steel at the lower end,
+    /// 0.05 oiled steel, 0.5 rubber
+    #[arg(long, value_name = "MU", default_value_t = FRICTION, value_parser = not_negative, allow_negative_numbers = true, help_heading = WHAT)]
+    pub(super) friction: f64,
     /// Worker threads; never changes the plan [default: all processors]
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true, help_heading = LIMITS)]
     pub(super) threads: u32,
@@ -296,6 +304,17 @@ pub(super) enum GroupsArgument {
     Needed,
     /// Also the groups that the input names
     Prefer,
+}
+
+/// What is reported about each step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum ReportArgument {
+    /// What falls before the first step and after each step, and what to hold. Up is `--up`, else +z (+y for glTF scenes)
+    Stability,
+    /// How near the step passes other parts
+    Clearance,
+    /// Which tools turn the nut or screw that the step takes off
+    Tools,
 }
 
 /// Which transition function.

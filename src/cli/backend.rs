@@ -3,12 +3,15 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use sbdp_ipc::plan::Reports;
+
 use super::error::CliError;
 use super::listener::Listener;
 use crate::cache::Cache;
 use crate::document::PlanDocument;
 use crate::geometry::{GeometryError, Revision, SourceAssembly};
 use crate::plan::{Base, Plan, PlanKind, PlanStats, PlanStatus};
+use crate::report::{ReportQuery, report};
 use crate::search::{PlanRequest, PlanSink, Termination};
 use crate::service::{Service, ServiceError};
 use crate::termination::Interrupt;
@@ -25,6 +28,8 @@ pub(super) struct CommandQuestion<'a> {
     pub(super) read: Duration,
     /// What to plan.
     pub(super) request: PlanRequest,
+    /// What to report about the plan.
+    pub(super) reports: Reports,
     /// When the answer is due.
     pub(super) deadline: Option<Instant>,
     /// Ends the work early; knows the deadline too.
@@ -51,15 +56,21 @@ impl Embedded {
 }
 
 impl Embedded {
-    fn planned(&self, question: &CommandQuestion<'_>, sink: &mut dyn PlanSink) -> Result<Plan, ServiceError> {
+    fn planned(
+        &self,
+        question: &CommandQuestion<'_>,
+        sink: &mut dyn PlanSink,
+    ) -> Result<PlanDocument, ServiceError> {
         let started = Instant::now();
         let termination = &question.termination;
+        let reports = ReportQuery::new(&question.reports)?;
         let admission = self.service.admit_until(question.assembly, termination)?;
         let admitted = started.elapsed();
         let revised = self.service.revise_until(admission.id, &question.revision, termination)?;
         let mut plan = self.service.plan(revised.id, &question.request, termination, sink)?;
         plan.stats.load_time_s = Some((question.read + admitted).as_secs_f64());
-        Ok(plan)
+        let report = report(&self.service, revised.id, &mut plan, &reports, termination)?;
+        Ok(PlanDocument::from(&plan).with_report(&report))
     }
 }
 
@@ -76,7 +87,7 @@ impl Backend for Embedded {
             Err(ServiceError::Geometry(GeometryError::Interrupted(interrupt))) => {
                 Ok(unplanned(question, PlanStatus::Timeout, interrupt.to_string()))
             }
-            planned => Ok(PlanDocument::from(&planned?)),
+            planned => Ok(planned?),
         }
     }
 }

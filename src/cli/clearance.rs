@@ -9,9 +9,10 @@ use super::error::CliError;
 use super::subject::Subject;
 use super::table::{TextTable, length, listed};
 use super::{interrupt, show};
-use crate::document::PlanDocument;
+use crate::document::{ClearanceDocument, ClosestDocument, PartNames, PlanDocument};
+use crate::report::{clearance_record, closest_record, passing_steps};
 use crate::search::Termination;
-use crate::service::{ClearanceQuery, PartClearance, StepClearance};
+use crate::service::{ClearanceQuery, StepClearance};
 
 /// The version of the document.
 const SCHEMA: &str = "sbdp-clearance/1";
@@ -20,7 +21,7 @@ const NOT_KEPT: u8 = 3;
 
 /// What `--json` writes. Names are those of the plan; lengths and points are in its units and frame.
 #[derive(Debug, Serialize)]
-struct ClearanceDocument<'a> {
+struct ClearancesDocument<'a> {
     schema: &'static str,
     units: Option<&'a str>,
     wanted: Option<f64>,
@@ -31,21 +32,9 @@ struct ClearanceDocument<'a> {
 struct StepClearanceDocument<'a> {
     step: usize,
     parts: &'a [String],
-    touching: Vec<&'a str>,
-    closest: Option<PartClearanceDocument<'a>>,
-    short: Vec<PartClearanceDocument<'a>>,
-}
-
-#[derive(Debug, Serialize)]
-struct PartClearanceDocument<'a> {
-    moving: &'a str,
-    standing: &'a str,
-    distance: f64,
-    at_least: f64,
-    assembled: f64,
-    segment: usize,
-    share: f64,
-    points: Option<[[f64; 3]; 2]>,
+    #[serde(flatten)]
+    clearance: ClearanceDocument,
+    short: Vec<ClosestDocument>,
 }
 
 pub(super) fn run(arguments: &ClearanceArguments) -> Result<ExitCode, CliError> {
@@ -53,7 +42,8 @@ pub(super) fn run(arguments: &ClearanceArguments) -> Result<ExitCode, CliError> 
     let (service, id) = subject.admitted_with_parts_of_plan()?;
     let termination = Termination::default();
     interrupt::cancel_on_interrupt(&termination.cancel_flag())?;
-    let query = ClearanceQuery { steps: subject.passing_steps()?, wanted: arguments.at_least };
+    let steps = passing_steps(&subject.plan).map_err(CliError::Refused)?;
+    let query = ClearanceQuery { steps, wanted: arguments.at_least };
     let found = service.clearance(id, &query, &termination)?;
     let found = found.ok_or_else(|| CliError::Failed("interrupted".to_owned()))?;
     let document = document(&subject.plan, &found, arguments.at_least);
@@ -67,36 +57,25 @@ fn document<'a>(
     plan: &'a PlanDocument,
     found: &[StepClearance],
     wanted: Option<f64>,
-) -> ClearanceDocument<'a> {
-    let name = |part: usize| plan.parts.get(part).map_or("?", String::as_str);
-    let described = |found: &PartClearance| PartClearanceDocument {
-        moving: name(found.moving),
-        standing: name(found.standing),
-        distance: found.distance,
-        at_least: found.at_least,
-        assembled: found.assembled,
-        segment: found.segment,
-        share: found.share,
-        points: found.points.map(|points| points.map(|p| p.coords.into())),
-    };
+) -> ClearancesDocument<'a> {
+    let names = PartNames(&plan.parts);
     let steps =
         plan.steps.iter().zip(found).enumerate().map(|(number, (step, found))| StepClearanceDocument {
             step: number,
             parts: &step.parts,
-            touching: found.touching.iter().map(|&part| name(part)).collect(),
-            closest: found.closest.as_ref().map(described),
-            short: found.short.iter().map(described).collect(),
+            clearance: names.clearance(&clearance_record(found)),
+            short: found.short.iter().map(|pair| names.closest(&closest_record(pair))).collect(),
         });
-    ClearanceDocument { schema: SCHEMA, units: plan.units.as_deref(), wanted, steps: steps.collect() }
+    ClearancesDocument { schema: SCHEMA, units: plan.units.as_deref(), wanted, steps: steps.collect() }
 }
 
-fn table(document: &ClearanceDocument<'_>) -> String {
+fn table(document: &ClearancesDocument<'_>) -> String {
     let units = document.units;
     let mut table =
         TextTable::new(&["step", "moves", "nearest", "certain", "to", "on the way", "touches at first"]);
     for step in &document.steps {
-        let moves = listed(&step.parts.iter().map(String::as_str).collect::<Vec<_>>());
-        let [distance, certain, to, at] = match &step.closest {
+        let moves = listed(step.parts);
+        let [distance, certain, to, at] = match &step.clearance.closest {
             None => ["–"; 4].map(str::to_owned),
             Some(closest) => [
                 length(closest.distance, units),
@@ -104,12 +83,20 @@ fn table(document: &ClearanceDocument<'_>) -> String {
                 if step.parts.len() > 1 {
                     format!("{} from {}", closest.standing, closest.moving)
                 } else {
-                    closest.standing.to_owned()
+                    closest.standing.clone()
                 },
                 format!("{}, {:.0} %", closest.segment + 1, closest.share * 100.0),
             ],
         };
-        table.row([(step.step + 1).to_string(), moves, distance, certain, to, at, listed(&step.touching)]);
+        table.row([
+            (step.step + 1).to_string(),
+            moves,
+            distance,
+            certain,
+            to,
+            at,
+            listed(&step.clearance.touching),
+        ]);
     }
     let mut text = table.render();
     text.push_str(
@@ -123,10 +110,10 @@ fn table(document: &ClearanceDocument<'_>) -> String {
 }
 
 /// Which pairs of parts do not keep the distance that is wanted.
-fn verdict(document: &ClearanceDocument<'_>, wanted: f64) -> String {
+fn verdict(document: &ClearancesDocument<'_>, wanted: f64) -> String {
     let units = document.units;
     let short = document.steps.iter().flat_map(|step| step.short.iter().map(move |pair| (step.step, pair)));
-    let line = |(step, pair): (usize, &PartClearanceDocument<'_>)| {
+    let line = |(step, pair): (usize, &ClosestDocument)| {
         format!(
             "step {}: {} passes {} at {} (certain is {}), as assembled {}\n",
             step + 1,

@@ -217,6 +217,7 @@ fn options(question: &CommandQuestion<'_>, trace: bool) -> PlanOptions {
         batch: false,
         moved: Vec::new(),
         assembly: request.assembly.as_ref().map(staging),
+        reports: question.reports,
     }
 }
 

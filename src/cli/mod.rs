@@ -22,6 +22,7 @@ mod part_names;
 mod plan;
 mod progress;
 mod report;
+mod report_lines;
 mod schedule;
 mod staging;
 mod standing;

@@ -6,8 +6,9 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use sbdp_client::ConnectOptions;
+use sbdp_ipc::plan::{Gravity, Reports};
 
-use super::args::{GroupsArgument, PlanArguments};
+use super::args::{GroupsArgument, PlanArguments, ReportArgument};
 use super::backend::{Backend, CommandQuestion, Embedded};
 use super::daemon::{Daemon, concluded, went_away};
 use super::error::{CliError, exit_code};
@@ -20,7 +21,7 @@ use crate::bench::end_with_benchmark;
 use crate::cache::CacheSettings;
 use crate::document::{PlanDocument, SourceDocument};
 use crate::document::{absolute, content_of, source, with_files};
-use crate::files::{LoadOptions, load};
+use crate::files::{LoadOptions, customary_up, load};
 use crate::geometry::{Revision, SourceAssembly, content_hash, pose_from_waypoint};
 use crate::search::{PlanRequest, Planner, Termination};
 use crate::simulation::PenaltyParameters;
@@ -59,6 +60,7 @@ pub(super) fn planned(arguments: &PlanArguments) -> Result<Planned, CliError> {
     let revision = revision(arguments, &assembly, &further(&options))?;
     let revised = assembly.revised(&revision);
     let request = request(arguments, &revised)?;
+    let reports = reports(arguments, &revised);
     interrupt::cancel_on_interrupt(&termination.cancel_flag())?;
     reading.store(false, Ordering::Relaxed);
     let backend = choose_backend(arguments, &termination)?;
@@ -68,6 +70,7 @@ pub(super) fn planned(arguments: &PlanArguments) -> Result<Planned, CliError> {
         revised: &revised,
         read,
         request,
+        reports,
         deadline,
         termination,
     };
@@ -124,6 +127,17 @@ fn request(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<PlanR
         assembly: arguments.together.then(|| staging(assembly, &arguments.staging)).transpose()?,
         no_cache: arguments.no_cache,
     })
+}
+
+fn reports(arguments: &PlanArguments, assembly: &SourceAssembly) -> Reports {
+    let has = |what| arguments.report.contains(&what);
+    let up = arguments.up.unwrap_or_else(|| customary_up(assembly));
+    let gravity = Gravity { up, friction: arguments.friction };
+    Reports {
+        stability: has(ReportArgument::Stability).then_some(gravity),
+        clearance: has(ReportArgument::Clearance),
+        tools: has(ReportArgument::Tools),
+    }
 }
 
 /// The groups that the assembly names, if they are preferred.

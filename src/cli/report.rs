@@ -4,14 +4,15 @@ use std::collections::HashMap;
 
 use nalgebra::Point3;
 
+use super::report_lines::{clearance, stability, tools};
 use super::table::{TextTable, length};
 use crate::document::{
     CacheDocument, FreeGroupDocument, OverlapDocument, Placements, PlanDocument, StepDocument, StepFrame,
-    WarningDocument,
+    WarningDocument, kind_of,
 };
 use crate::geometry::{Bounds, Pose, SourceAssembly, SourceMesh, pose_from_waypoint};
 use crate::plan::{MotionKind, PlanKind, StepEnd};
-use crate::view::{blockers, direction, kind_of, part_word, part_words, verdict};
+use crate::view::{blockers, direction, part_word, part_words, verdict};
 
 /// Count of parts that a row of the table names; more are counted. With names of ten letters, the row still fits 120
 /// columns. At half, pairs alone are named; at double, rows wrap.
@@ -31,6 +32,9 @@ pub(super) fn plan(assembly: &SourceAssembly, plan: &PlanDocument, verbose: bool
     let sections = [
         ("base", base(plan)),
         ("remaining", remaining(plan)),
+        ("stands", stability(plan)),
+        ("passes nearest", clearance(plan, verbose)),
+        ("tools", tools(plan)),
         ("left together and not taken apart", plan.kept_together.iter().map(|g| words(g, ", ")).collect()),
         ("not complete", verdict(plan).into_iter().collect()),
         ("can begin to move together", free_together(plan)),

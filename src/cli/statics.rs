@@ -6,14 +6,16 @@ use serde::Serialize;
 
 use super::args::StaticsArguments;
 use super::error::CliError;
+use super::report_lines::{fall, hands, hold};
 use super::standing::{StandingPlan, check_order_is_free};
 use super::table::{TextTable, listed};
 use super::{interrupt, show, written};
-use crate::document::{PlanDocument, StepDocument};
+use crate::document::{PartNames, PlanDocument, StabilityDocument, StepDocument};
 use crate::geometry::pose_from_waypoint;
+use crate::report::stability_record;
 use crate::search::Termination;
-use crate::service::{JointKind, OrderedStep, StandingState};
-use crate::statics::Stability;
+use crate::service::{JointKind, OrderedStep};
+use crate::view::direction;
 
 /// The version of the document.
 const SCHEMA: &str = "sbdp-statics/1";
@@ -41,23 +43,9 @@ struct JointDocument<'a> {
 struct StateDocument<'a> {
     after: usize,
     standing: Vec<&'a str>,
-    needs_friction: f64,
     margin: Option<f64>,
-    unstable: Vec<UnstableDocument<'a>>,
-    unknown: Vec<&'a str>,
-}
-
-#[derive(Debug, Serialize)]
-struct UnstableDocument<'a> {
-    falls: Vec<FallDocument<'a>>,
-    hold: Vec<Vec<&'a str>>,
-    needs_clamping: bool,
-}
-
-#[derive(Debug, Serialize)]
-struct FallDocument<'a> {
-    part: &'a str,
-    direction: [f64; 3],
+    #[serde(flatten)]
+    stability: StabilityDocument,
 }
 
 pub(super) fn run(arguments: &StaticsArguments) -> Result<ExitCode, CliError> {
@@ -96,10 +84,18 @@ pub(super) fn run(arguments: &StaticsArguments) -> Result<ExitCode, CliError> {
             .iter()
             .zip(&answer.states)
             .enumerate()
-            .map(|(after, (state, found))| described(after, state, found, name))
+            .map(|(after, (state, found))| StateDocument {
+                after,
+                standing: state.parts.iter().map(|(part, _)| name(*part)).collect(),
+                margin: found.margin,
+                stability: PartNames(&plan.parts).stability(&stability_record(found)),
+            })
             .collect(),
     };
-    let text = || format!("{}\n{}\n", table(plan, &document), hands(&answer.states));
+    let text = || {
+        let states: Vec<&StabilityDocument> = document.states.iter().map(|state| &state.stability).collect();
+        format!("{}\n{}\n", table(plan, &document), hands(&states))
+    };
     show(arguments.json.as_deref(), &document, "states", text)?;
     Ok(ExitCode::SUCCESS)
 }
@@ -137,38 +133,13 @@ fn ordered_steps(plan: &PlanDocument) -> Result<Vec<OrderedStep>, CliError> {
     Ok(plan.steps.iter().enumerate().map(ordered).collect())
 }
 
-fn described<'a>(
-    after: usize,
-    state: &StandingState,
-    stability: &Stability,
-    name: impl Fn(usize) -> &'a str,
-) -> StateDocument<'a> {
-    let names = |parts: &[usize]| parts.iter().map(|&part| name(part)).collect::<Vec<_>>();
-    let unstable = stability.unstable.iter().map(|unstable| UnstableDocument {
-        falls: unstable
-            .falls
-            .iter()
-            .map(|fall| FallDocument { part: name(fall.part), direction: fall.direction })
-            .collect(),
-        hold: unstable.hold.iter().map(|set| names(set)).collect(),
-        needs_clamping: unstable.needs_clamping,
-    });
-    StateDocument {
-        after,
-        standing: state.parts.iter().map(|(part, _)| name(*part)).collect(),
-        needs_friction: stability.needs_friction,
-        margin: stability.margin,
-        unstable: unstable.collect(),
-        unknown: names(&stability.unknown),
-    }
-}
-
 fn table(plan: &PlanDocument, document: &StaticsDocument<'_>) -> String {
     let stays = document.stays.join(", ");
-    let mut text = format!("{stays} stays; up is {}; friction {}\n", vector(&document.up), document.friction);
+    let mut text =
+        format!("{stays} stays; up is {}; friction {}\n", direction(&document.up.into()), document.friction);
     let joined: Vec<String> = document.joined.iter().map(|joint| joint.parts.join(" and ")).collect();
     if !joined.is_empty() {
-        let joined = listed(&joined.iter().map(String::as_str).collect::<Vec<_>>());
+        let joined = listed(&joined);
         text.push_str(&format!("as one body while both stand: {joined}\n"));
     }
     text.push('\n');
@@ -176,22 +147,21 @@ fn table(plan: &PlanDocument, document: &StaticsDocument<'_>) -> String {
         TextTable::new(&["after", "moved", "standing", "needs friction", "margin", "hold", "or else"]);
     for state in &document.states {
         let moved = match state.after.checked_sub(1).and_then(|step| plan.steps.get(step)) {
-            Some(step) => listed(&step.parts.iter().map(String::as_str).collect::<Vec<_>>()),
+            Some(step) => listed(&step.parts),
             None => "–".to_owned(),
         };
-        let first =
-            |u: &UnstableDocument<'_>| u.hold.first().map_or_else(String::new, |set| set.join(" and "));
-        let hold: Vec<String> = state.unstable.iter().map(first).collect();
-        let mut falls: Vec<String> = state.unstable.iter().map(fall).collect();
-        if !state.unknown.is_empty() {
-            falls.push(format!("not known: {}", listed(&state.unknown)));
+        let stability = &state.stability;
+        let hold: Vec<String> = stability.unstable.iter().map(hold).collect();
+        let mut falls: Vec<String> = stability.unstable.iter().map(fall).collect();
+        if !stability.unknown.is_empty() {
+            falls.push(format!("not known: {}", listed(&stability.unknown)));
         }
         table.row([
             state.after.to_string(),
             moved,
             state.standing.len().to_string(),
-            if state.needs_friction > 0.0 {
-                format!("{:.3}", state.needs_friction)
+            if stability.needs_friction > 0.0 {
+                format!("{:.3}", stability.needs_friction)
             } else {
                 "none".to_owned()
             },
@@ -202,34 +172,4 @@ fn table(plan: &PlanDocument, document: &StaticsDocument<'_>) -> String {
     }
     text.push_str(&table.render());
     text
-}
-
-/// How many parts have to be held at once, and when first.
-fn hands(states: &[Stability]) -> String {
-    match states.iter().enumerate().max_by_key(|(after, state)| (state.hands(), std::cmp::Reverse(*after))) {
-        Some((after, state)) if state.hands() > 0 => {
-            let parts = if state.hands() == 1 { "part has" } else { "parts have" };
-            let when =
-                if after == 0 { "before the first step".to_owned() } else { format!("after step {after}") };
-            format!("At most {} {parts} to be held at once, first {when}.", state.hands())
-        }
-        _ => "Nothing has to be held.".to_owned(),
-    }
-}
-
-/// What falls, and where to.
-fn fall(unstable: &UnstableDocument<'_>) -> String {
-    let names: Vec<&str> = unstable.falls.iter().map(|fall| fall.part).collect();
-    let to =
-        unstable.falls.first().map_or_else(String::new, |fall| format!(" along {}", vector(&fall.direction)));
-    let pressed = if unstable.needs_clamping { ", as nothing presses it" } else { "" };
-    format!("{} {}{to}{pressed}", listed(&names), if names.len() == 1 { "falls" } else { "fall" })
-}
-
-fn vector(vector: &[f64; 3]) -> String {
-    let axes = ["x", "y", "z"];
-    match vector.iter().position(|x| x.abs() > 0.999) {
-        Some(axis) => format!("{}{}", if vector[axis] > 0.0 { "+" } else { "-" }, axes[axis]),
-        None => format!("({:.2}, {:.2}, {:.2})", vector[0], vector[1], vector[2]),
-    }
 }

@@ -9,16 +9,16 @@ use super::part_names::part_named;
 use crate::blocking_graph::DirectionalGraph;
 use crate::cache::CacheSettings;
 use crate::document::content_of;
-use crate::document::{MOTION_ROUNDING, Placements, StepParts};
-use crate::document::{PlanDocument, SourceDocument, StepDocument};
-use crate::files::{LoadOptions, StepSettings, load};
+use crate::document::{MOTION_ROUNDING, Placements, kind_of};
+use crate::document::{PlanDocument, SourceDocument};
+use crate::files::{LoadOptions, StepSettings, customary_up, load};
 use crate::geometry::{
     Assembly, Pose, Revision, SourceAssembly, SourceMesh, content_hash, pose_from_waypoint,
 };
 use crate::plan::PlanKind;
 use crate::search::Termination;
-use crate::service::{AssemblyId, PassingStep, Service};
-use crate::view::{Instructions, PlanScene, Up, ViewError, equal_parts, glb, kind_of, page, read_plan};
+use crate::service::{AssemblyId, Service};
+use crate::view::{Instructions, PlanScene, Up, ViewError, equal_parts, glb, page, read_plan};
 
 /// A plan, and the meshes that it moves.
 pub(super) struct Subject {
@@ -110,17 +110,6 @@ impl Subject {
         Ok((service, id))
     }
 
-    /// The steps of the plan with what moves and what stands in each.
-    pub(super) fn passing_steps(&self) -> Result<Vec<PassingStep>, CliError> {
-        let parts = Placements::parts_of_steps(kind_of(&self.plan), &self.plan).map_err(CliError::Refused)?;
-        let step = |(StepParts { moving, standing }, step): (StepParts, &StepDocument)| PassingStep {
-            moving,
-            standing,
-            path: step.path.iter().map(pose_from_waypoint).collect(),
-        };
-        Ok(parts.into_iter().zip(&self.plan.steps).map(step).collect())
-    }
-
     /// The assembly as the plan begins with it.
     pub(super) fn assembly(&self) -> Result<Assembly, CliError> {
         let (service, id) = self.admitted()?;
@@ -129,12 +118,7 @@ impl Subject {
 
     /// Which way is up, by the custom of its files.
     pub(super) fn up(&self) -> Up {
-        let is_scene = |origin: &str| {
-            let extension = Path::new(origin).extension().and_then(|e| e.to_str()).unwrap_or_default();
-            ["gltf", "glb"].iter().any(|e| extension.eq_ignore_ascii_case(e))
-        };
-        let scene = self.base.parts.iter().all(|p| is_scene(&p.origin));
-        if scene { Up::Y } else { Up::Z }
+        if customary_up(&self.base)[1] > 0.0 { Up::Y } else { Up::Z }
     }
 
     /// The plan as instructions, in which equal parts are known by their shapes.

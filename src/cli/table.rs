@@ -32,9 +32,10 @@ impl TextTable {
 }
 
 /// A few names, and how many there are besides.
-pub(super) fn listed(names: &[&str]) -> String {
+pub(super) fn listed<S: AsRef<str>>(names: &[S]) -> String {
     /// Count of names. At half, pairs look like many; at double, the table is wider than most terminals.
     const NAMED: usize = 3;
+    let names: Vec<&str> = names.iter().map(AsRef::as_ref).collect();
     match names.get(..NAMED) {
         Some(few) if names.len() > NAMED => format!("{} and {} more", few.join(", "), names.len() - NAMED),
         _ => names.join(", "),

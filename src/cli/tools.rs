@@ -9,13 +9,14 @@ use super::error::CliError;
 use super::subject::Subject;
 use super::table::{TextTable, length, listed};
 use super::{interrupt, show};
-use crate::fasteners::Drive;
+use crate::document::{PartNames, ToolDocument};
+use crate::report::{fastener_record, passing_steps};
 use crate::search::Termination;
 use crate::service::FastenerTools;
-use crate::tools::{ToolKind, ToolRoom};
+use crate::tools::ToolKind;
 
 /// The version of the document.
-const SCHEMA: &str = "sbdp-tools/1";
+const SCHEMA: &str = "sbdp-tools/2";
 /// The exit code where a fastener has no tool: that of a plan that is not complete.
 const NO_TOOL: u8 = 3;
 
@@ -32,18 +33,9 @@ struct ToolsDocument<'a> {
 struct FastenerDocument<'a> {
     step: usize,
     part: &'a str,
-    drive: &'static str,
-    across_flats: f64,
-    tools: Vec<ToolDocument<'a>>,
-}
-
-#[derive(Debug, Serialize)]
-struct ToolDocument<'a> {
-    tool: &'static str,
-    swing: f64,
-    needs: f64,
-    fits: bool,
-    blocked_by: Vec<&'a str>,
+    /// The width across its flats.
+    size: f64,
+    tools: Vec<ToolDocument>,
 }
 
 pub(super) fn run(arguments: &ToolsArguments) -> Result<ExitCode, CliError> {
@@ -51,38 +43,22 @@ pub(super) fn run(arguments: &ToolsArguments) -> Result<ExitCode, CliError> {
     let (service, id) = subject.admitted_with_parts_of_plan()?;
     let termination = Termination::default();
     interrupt::cancel_on_interrupt(&termination.cancel_flag())?;
-    let found = service.tools(id, &subject.passing_steps()?, &termination)?;
+    let steps = passing_steps(&subject.plan).map_err(CliError::Refused)?;
+    let found = service.tools(id, &steps, &termination)?;
     let found = found.ok_or_else(|| CliError::Failed("interrupted".to_owned()))?;
     let plan = &subject.plan;
-    let name = |part: usize| plan.parts.get(part).map_or("?", String::as_str);
-    let steps =
-        found.iter().enumerate().filter_map(|(step, found)| Some(described(step, found.as_ref()?, name)));
+    let described = |(step, found): (usize, &Option<FastenerTools>)| {
+        let found = found.as_ref()?;
+        let tools = PartNames(&plan.parts).tools(&fastener_record(found));
+        Some(FastenerDocument { step, part: plan.parts.get(found.part)?, size: found.across_flats, tools })
+    };
+    let steps = found.iter().enumerate().filter_map(described);
     let document = ToolsDocument { schema: SCHEMA, units: plan.units.as_deref(), steps: steps.collect() };
     let has_tool = |step: &FastenerDocument<'_>| step.tools.iter().any(|tool| tool.fits);
     let is_missing = arguments.required && !document.steps.iter().all(has_tool);
     let exit_code = if is_missing { ExitCode::from(NO_TOOL) } else { ExitCode::SUCCESS };
     show(arguments.json.as_deref(), &document, "tools", || table(&document))?;
     Ok(exit_code)
-}
-
-fn described<'a>(
-    step: usize,
-    found: &FastenerTools,
-    name: impl Fn(usize) -> &'a str,
-) -> FastenerDocument<'a> {
-    let tool = |room: &ToolRoom| ToolDocument {
-        tool: room.kind.name(),
-        swing: room.swing.to_degrees(),
-        needs: room.kind.least_swing().to_degrees(),
-        fits: room.is_enough(),
-        blocked_by: room.blocked_by.iter().map(|&part| name(part)).collect(),
-    };
-    let drive = match found.drive {
-        Drive::Hexagon => "hexagon",
-        Drive::HexagonSocket => "hexagon_socket",
-    };
-    let tools = found.rooms.iter().map(tool).collect();
-    FastenerDocument { step, part: name(found.part), drive, across_flats: found.across_flats, tools }
 }
 
 fn table(document: &ToolsDocument<'_>) -> String {
@@ -100,12 +76,10 @@ fn table(document: &ToolsDocument<'_>) -> String {
             let tool = step.tools.iter().find(|tool| tool.tool == kind.name());
             tool.map_or_else(|| "–".to_owned(), swing)
         };
-        let mut blockers: Vec<&str> =
-            step.tools.iter().flat_map(|tool| tool.blocked_by.iter().copied()).collect();
+        let mut blockers: Vec<&String> = step.tools.iter().flat_map(|tool| &tool.blocked_by).collect();
         blockers.sort_unstable();
         blockers.dedup();
-        let first =
-            [(step.step + 1).to_string(), step.part.to_owned(), length(step.across_flats, document.units)];
+        let first = [(step.step + 1).to_string(), step.part.to_owned(), length(step.size, document.units)];
         table.row(first.into_iter().chain(kinds.map(cell)).chain([listed(&blockers)]));
     }
     let without: Vec<&str> = document
@@ -122,7 +96,7 @@ fn table(document: &ToolsDocument<'_>) -> String {
 }
 
 /// How far a tool swings.
-fn swing(tool: &ToolDocument<'_>) -> String {
+fn swing(tool: &ToolDocument) -> String {
     match tool.swing {
         0.0 => "no way to it".to_owned(),
         360.0.. => "all around".to_owned(),

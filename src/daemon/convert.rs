@@ -8,6 +8,7 @@ use sbdp_ipc::geometry::{Assembly, Part};
 use sbdp_ipc::plan as wire;
 use sbdp_ipc::progress::{ProgressSample, STAGE_SDF, STAGE_SEARCH, STAGE_TRANSFER, TRIED_TURNS};
 use sbdp_ipc::revision as wire_revision;
+use sbdp_ipc::summary::report::Report;
 use sbdp_ipc::summary::{NO_PART, OverlapRecord, Stats, SummaryParts};
 
 use crate::blocking_graph::StaticAnalysis;
@@ -144,8 +145,8 @@ fn numbers(list: &[usize]) -> Vec<u32> {
     list.iter().map(|i| *i as u32).collect()
 }
 
-/// Everything of a plan but its steps, as it travels, with what its making took this time.
-pub(crate) fn summary(plan: &Plan, spent: &PlanStats) -> Vec<u8> {
+/// Everything of a plan but its steps, as it travels, with the report about it and what its making took this time.
+pub(crate) fn summary(plan: &Plan, report: Option<&Report>, spent: &PlanStats) -> Vec<u8> {
     SummaryParts {
         assembly: plan.kind == PlanKind::Assembly,
         status: status(plan.status),
@@ -179,6 +180,7 @@ pub(crate) fn summary(plan: &Plan, spent: &PlanStats) -> Vec<u8> {
             .iter()
             .map(|(part, pose)| wire::MovedPart { part: *part as u32, reserved: 0, motion: *pose })
             .collect(),
+        report: report.cloned(),
         stats: stats(spent),
     }
     .encode()
@@ -267,6 +269,7 @@ pub(crate) fn service_error(error: &ServiceError) -> WireError {
         | ServiceError::FixedAndKept { .. }
         | ServiceError::NoLength { .. }
         | ServiceError::NoDirection { .. }
+        | ServiceError::NoFriction { .. }
         | ServiceError::NoGroups { .. } => ErrorCode::Unsupported,
         ServiceError::Geometry(GeometryError::Interrupted(Interrupt::Cancelled)) => ErrorCode::Cancelled,
         ServiceError::Geometry(GeometryError::Interrupted(Interrupt::DeadlinePassed)) => ErrorCode::Expired,

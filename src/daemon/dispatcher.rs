@@ -25,6 +25,7 @@ use super::shutdown::Shutdown;
 use super::uploads::Uploads;
 use super::workers::WorkerEvent;
 use crate::config::{Config, seconds};
+use crate::report::ReportQuery;
 use crate::service::AssemblyId;
 
 /// The limits that the dispatcher enforces.
@@ -202,6 +203,8 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
             .map_err(|e| refuse(ErrorCode::Malformed, format!("plan request: {e}")))?;
         let request =
             convert::plan_request(&wire, self.limits.threads).map_err(|error| (Input::Refuse, error))?;
+        let reports = ReportQuery::new(&wire.reports)
+            .map_err(|error| (Input::Refuse, convert::service_error(&error)))?;
         let assembly = AssemblyId(wire.handle);
         let question = question(&wire);
         let answer = question.as_deref().and_then(|question| self.answers.get(question));
@@ -222,7 +225,8 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
         let moved = convert::moved(&wire.moved);
         let received = Instant::now();
         let trace = wire.trace;
-        let job = PlanJob { key, owner, received, assembly, question, moved, request, trace, termination };
+        let job =
+            PlanJob { key, owner, received, assembly, question, moved, request, reports, trace, termination };
         let rejected = match self.queues.plans.push(Ticket { owner, class, bytes: 0 }, job) {
             Ok(()) => {
                 session.input(Input::Enqueue);

@@ -7,6 +7,7 @@ use sbdp_ipc::bytes::AlignedBytes;
 
 use super::request_queue::Owner;
 use crate::geometry::Pose;
+use crate::report::ReportQuery;
 use crate::search::{PlanRequest, Termination};
 use crate::service::AssemblyId;
 
@@ -29,6 +30,8 @@ pub(crate) struct PlanJob {
     /// Parts that the request moves.
     pub(crate) moved: Vec<(usize, Pose)>,
     pub(crate) request: PlanRequest,
+    /// What to report about the plan.
+    pub(crate) reports: ReportQuery,
     /// The client wants the events of the search.
     pub(crate) trace: bool,
     pub(crate) termination: Termination,
@@ -46,6 +49,7 @@ impl PlanJob {
             question: None,
             moved: vec![],
             request,
+            reports: ReportQuery::default(),
             trace: false,
             termination: Termination::default(),
         }

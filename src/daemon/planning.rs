@@ -3,9 +3,11 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use sbdp_ipc::error::{ErrorCode, WireError};
+use sbdp_ipc::summary::report::Report;
 
 use crate::geometry::{Pose, Revision, SourceAssembly, remember_given, remember_revised};
 use crate::plan::Plan;
+use crate::report::{ReportQuery, report};
 use crate::search::{PlanRequest, PlanSink, Termination};
 use crate::service::{
     Admission, AnsweredQuestion, AssemblyId, MemoryStatistics, Service, ServiceError, recent_answers,
@@ -90,6 +92,19 @@ pub trait Planning: Send + Sync + 'static {
         termination: &Termination,
         sink: &mut dyn PlanSink,
     ) -> Result<Plan, ServiceError>;
+    /// See [`report`].
+    ///
+    /// # Errors
+    /// The assembly is unknown, or is not the one that the plan is about.
+    fn report(
+        &self,
+        _id: AssemblyId,
+        _plan: &mut Plan,
+        _query: &ReportQuery,
+        _termination: &Termination,
+    ) -> Result<Report, ServiceError> {
+        Ok(Report::default())
+    }
 }
 
 impl Planning for Service {
@@ -176,6 +191,16 @@ impl Planning for Service {
         sink: &mut dyn PlanSink,
     ) -> Result<Plan, ServiceError> {
         Self::plan(self, id, request, termination, sink)
+    }
+
+    fn report(
+        &self,
+        id: AssemblyId,
+        plan: &mut Plan,
+        query: &ReportQuery,
+        termination: &Termination,
+    ) -> Result<Report, ServiceError> {
+        report(self, id, plan, query, termination)
     }
 }
 

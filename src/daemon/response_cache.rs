@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use sbdp_ipc::plan::PlanRequest;
+use sbdp_ipc::summary::report::Report;
 use serde::Serialize;
 
 use super::convert;
@@ -29,14 +30,14 @@ pub(crate) struct CachedResponse {
 impl CachedResponse {
     /// The response when the request that led to a plan is repeated. `None` if the plan ended by the clock: another
     /// run may find another plan.
-    pub(crate) fn of(plan: &Plan) -> Option<Self> {
+    pub(crate) fn of(plan: &Plan, report: Option<&Report>) -> Option<Self> {
         if matches!(plan.status, PlanStatus::Timeout | PlanStatus::Cancelled) {
             return None;
         }
         let steps: Vec<_> = plan.steps.iter().map(convert::step).collect();
         let PlanStats { simulations, sweeps, states, .. } = plan.stats;
         let stats = PlanStats { simulations, sweeps, states, plan_hit: true, ..PlanStats::default() };
-        let summary = convert::summary(plan, &stats);
+        let summary = convert::summary(plan, report, &stats);
         let mut messages = steps_messages(&steps);
         messages.push(summary);
         // The messages are kept for long, and a vector that grew by doubling has up to half of its memory unused.
@@ -148,6 +149,7 @@ fn cost(question: &[u8], answer: &CachedResponse) -> usize {
 mod tests {
     use super::*;
     use crate::fixtures::plan_of;
+    use sbdp_ipc::plan::Reports;
 
     fn answer(bytes: usize) -> CachedResponse {
         CachedResponse { steps: vec![Arc::new(vec![1; bytes - 8])], summary: Arc::new(vec![0; 8]) }
@@ -174,7 +176,7 @@ mod tests {
     #[test]
     fn what_the_clock_did_not_end_is_repeated_under_its_status() {
         let repeated = |status| {
-            let answer = CachedResponse::of(&plan_of(status, vec![]))?;
+            let answer = CachedResponse::of(&plan_of(status, vec![]), None)?;
             let bytes = sbdp_ipc::bytes::AlignedBytes::copy_of(&answer.summary);
             Some(sbdp_ipc::summary::SummaryView::new(bytes.as_slice()).unwrap().status())
         };
@@ -217,6 +219,8 @@ mod tests {
         assert_eq!(question(&request), question(&same));
         assert_ne!(question(&request), question(&PlanRequest { fixed: vec![2], ..request.clone() }));
         assert_ne!(question(&request), question(&PlanRequest { static_analysis: 1, ..request.clone() }));
+        let reports = Reports { tools: true, ..Reports::default() };
+        assert_ne!(question(&request), question(&PlanRequest { reports, ..request.clone() }));
         assert_eq!(question(&PlanRequest { trace: true, ..request.clone() }), None);
         assert_eq!(question(&PlanRequest { path_timeout_ns: Some(9), ..request.clone() }), None);
         assert_eq!(question(&PlanRequest { no_cache: true, ..request }), None);

@@ -18,7 +18,7 @@ use super::speculation::Speculation;
 use crate::files::load_assembly;
 use crate::plan::{Plan, PlanStep};
 use crate::search::{PlanSink, Progress, Termination, TraceEvent};
-use crate::service::AssemblyId;
+use crate::service::{AssemblyId, ServiceError};
 
 /// What workers report.
 #[derive(Debug)]
@@ -172,23 +172,29 @@ fn plan<P: Planning>(service: &P, job: &PlanJob, queues: &Queues, report: &Repor
     let mut sink = Sink { key: job.key, report, last_progress: None, trace };
     let planned = contained(|| {
         let assembly = with_moved(service, job.assembly, &job.moved, &job.termination)?;
-        service.plan(assembly, &job.request, &job.termination, &mut sink)
+        let mut plan = service.plan(assembly, &job.request, &job.termination, &mut sink)?;
+        let report = service.report(assembly, &mut plan, &job.reports, &job.termination)?;
+        Ok::<_, ServiceError>((plan, report))
     });
     sink.report_trace();
     report(match planned {
-        Ok(Ok(plan)) => {
+        Ok(Ok((plan, report))) => {
             log_plan(&plan);
             // Before the client learns of the plan, and may ask one of these questions.
             if let Some(speculation) = Speculation::after(job, &plan, queues.speculation) {
                 queues.prefetch.speculate(speculation);
             }
-            let again = job.question.clone().zip(CachedResponse::of(&plan));
+            let report = (!job.reports.is_empty()).then_some(&report);
+            // A report that the clock ended is not given again.
+            let is_whole = job.termination.check().is_ok();
+            let question = job.question.clone().filter(|_| report.is_none() || is_whole);
+            let again = question.zip(CachedResponse::of(&plan, report));
             if let Some((question, answer)) = &again {
                 service.remember(question, answer.messages());
             }
             WorkerEvent::Planned {
                 key: job.key,
-                summary: Arc::new(convert::summary(&plan, &plan.stats)),
+                summary: Arc::new(convert::summary(&plan, report, &plan.stats)),
                 again,
                 graphs_remembered: plan.stats.graph_hits,
             }

@@ -12,12 +12,19 @@ pub use order::reordered;
 pub(crate) use placements::MOTION_ROUNDING;
 pub use placements::{Placements, StepFrame, StepParts};
 pub use sbdp_ipc::document::{
-    BlockedDocument, CacheDocument, FreeGroupDocument, GroupDocument, InitialDocument, OverlapDocument,
-    PlanDocument, SCHEMA, SourceDocument, StatsDocument, StepDocument, WarningDocument,
+    BlockedDocument, CacheDocument, ClearanceDocument, ClosestDocument, FallDocument, FreeGroupDocument,
+    GroupDocument, InitialDocument, OverlapDocument, PartNames, PlanDocument, SCHEMA, SourceDocument,
+    StabilityDocument, StatsDocument, StepDocument, ToolDocument, UnstableDocument, WarningDocument,
 };
 
 use crate::geometry::Waypoint;
-use crate::plan::{Blocked, FreeGroup, Overlap, Plan, PlanStats, PlanStep, Warning};
+use crate::plan::{Blocked, FreeGroup, Overlap, Plan, PlanKind, PlanStats, PlanStep, Warning};
+
+/// What a plan does, whose kind is one that is known.
+#[must_use]
+pub fn kind_of(plan: &PlanDocument) -> PlanKind {
+    if plan.kind == PlanKind::Assembly.name() { PlanKind::Assembly } else { PlanKind::Disassembly }
+}
 
 impl From<&Plan> for PlanDocument {
     fn from(plan: &Plan) -> Self {
@@ -32,7 +39,11 @@ impl From<&Plan> for PlanDocument {
             units: plan.units.clone(),
             parts: plan.parts.clone(),
             groups: Vec::new(),
-            initial: InitialDocument { removed: plan.names(&plan.removed), poses: poses(plan) },
+            initial: InitialDocument {
+                removed: plan.names(&plan.removed),
+                poses: poses(plan),
+                stability: None,
+            },
             targets: plan.targets.as_ref().map(|t| plan.names(t)),
             fixed: plan.names(&plan.fixed),
             keep: plan.names(&plan.keep),
@@ -65,6 +76,9 @@ fn step(plan: &Plan, step: &PlanStep) -> StepDocument {
         requires: step.requires.clone(),
         wave: step.wave,
         direction: step.direction,
+        stability: None,
+        clearance: None,
+        tools: None,
     }
 }
 
@@ -119,7 +133,7 @@ fn stats(stats: &PlanStats) -> StatsDocument {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plan::{Base, MotionKind, PlanKind, PlanStatus, StepEnd};
+    use crate::plan::{Base, MotionKind, PlanStatus, StepEnd};
 
     fn plan() -> Plan {
         Plan {

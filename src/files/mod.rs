@@ -43,6 +43,17 @@ pub use self::step::StepSettings;
 pub(crate) use self::step::forget as forget_converted;
 pub(crate) use self::units::metres;
 
+/// The direction up by the custom of an assembly's files: +y of glTF scenes, else +z.
+#[must_use]
+pub fn customary_up(assembly: &SourceAssembly) -> [f64; 3] {
+    let is_scene = |origin: &str| {
+        let extension = Path::new(origin).extension().and_then(|e| e.to_str()).unwrap_or_default();
+        ["gltf", "glb"].iter().any(|e| extension.eq_ignore_ascii_case(e))
+    };
+    let are_scenes = assembly.parts.iter().all(|p| is_scene(&p.origin));
+    if are_scenes { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] }
+}
+
 /// Reads an assembly with default options; see [`load`].
 ///
 /// # Errors

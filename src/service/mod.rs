@@ -121,6 +121,12 @@ pub enum ServiceError {
         /// The given value.
         value: [f64; 3],
     },
+    /// A coefficient of friction is negative or not finite.
+    #[error("`friction` is {value}: give a number of at least 0")]
+    NoFriction {
+        /// The given value.
+        value: f64,
+    },
     /// Preferred groups were given to a planner that does not support them.
     #[error(
         "`groups` are for the planner sbdp-star with the extended actions, not for {planner} with the {actions} ones"

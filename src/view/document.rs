@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use nalgebra::Vector3;
 
 use super::ViewError;
-use crate::document::{MOTION_ROUNDING, Placements};
+use crate::document::{MOTION_ROUNDING, Placements, kind_of};
 use crate::document::{PlanDocument, SCHEMA, StepDocument};
 use crate::geometry::Waypoint;
 use crate::plan::PlanKind;
@@ -14,12 +14,6 @@ use crate::plan::PlanKind;
 const UNIT: f64 = 1e-3;
 /// Coordinates of waypoints are smaller: squares of single floats must be finite.
 const FURTHEST: f64 = 1e18;
-
-/// What a plan does that was read with [`read_plan`].
-#[must_use]
-pub fn kind_of(plan: &PlanDocument) -> PlanKind {
-    if plan.kind == PlanKind::Assembly.name() { PlanKind::Assembly } else { PlanKind::Disassembly }
-}
 
 /// Reads a plan and checks that it holds together: known schema and kind, all names those of parts, each step moves
 /// parts that stand in the body that it names, paths of at least one rigid transform, of which the first (of an assembly
@@ -79,7 +73,22 @@ fn named(plan: &PlanDocument) -> impl Iterator<Item = (&'static str, &str)> {
     let blocked = plan.blocked.iter().flat_map(|b| {
         std::iter::once(("blocked[].part", &b.part)).chain(b.by.iter().map(|n| ("blocked[].by", n)))
     });
-    let listed = lists.chain(targets).chain(poses).chain(steps).chain(groups).chain(blocked);
+    let states = plan.initial.stability.iter().chain(plan.steps.iter().filter_map(|s| s.stability.as_ref()));
+    let stability = states.flat_map(|state| {
+        let unstable = state
+            .unstable
+            .iter()
+            .flat_map(|u| u.falls.iter().map(|fall| &fall.part).chain(u.hold.iter().flatten()));
+        unstable.chain(&state.unknown).map(|n| ("stability", n))
+    });
+    let clearance = plan.steps.iter().filter_map(|s| s.clearance.as_ref()).flat_map(|clearance| {
+        let closest = clearance.closest.iter().flat_map(|closest| [&closest.moving, &closest.standing]);
+        closest.chain(&clearance.touching).map(|n| ("steps[].clearance", n))
+    });
+    let tools = plan.steps.iter().filter_map(|s| s.tools.as_ref()).flatten();
+    let tools = tools.flat_map(|tool| tool.blocked_by.iter().map(|n| ("steps[].tools[].blocked_by", n)));
+    let reports = stability.chain(clearance).chain(tools);
+    let listed = lists.chain(targets).chain(poses).chain(steps).chain(groups).chain(blocked).chain(reports);
     listed.map(|(field, name)| (field, name.as_str()))
 }
 
@@ -166,6 +175,9 @@ pub(super) mod tests {
             requires: vec![],
             wave: 0,
             direction: None,
+            stability: None,
+            clearance: None,
+            tools: None,
         }
     }
 

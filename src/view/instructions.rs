@@ -1,10 +1,10 @@
 //! The instructions of a plan: its steps in words, in which steps in a row that do the same with equal parts are one. Every
 //! form in which people read a plan (Markdown, HTML, pictures, the page) is made from these.
 
-use super::document::kind_of;
+use super::handling::{has_same_tool, held, holding, with_tool};
 use super::verdict::{blockers, verdict};
 use super::words::{Moved, Words, capital, free_together, kept_together, part_words, required, told_names};
-use crate::document::{GroupDocument, PlanDocument, StepDocument};
+use crate::document::{GroupDocument, PlanDocument, StabilityDocument, StepDocument, kind_of};
 use crate::plan::PlanKind;
 
 /// A plan in words.
@@ -14,8 +14,8 @@ pub struct Instructions {
     pub title: String,
     /// Why the plan is not complete.
     pub verdict: Option<String>,
-    /// Which parts are gone before the first step.
-    pub gone: Option<String>,
+    /// Which parts are gone before the first step, and which have to be held from the start.
+    pub before: Option<String>,
     /// What to do, in order.
     pub list: Vec<Instruction>,
     /// What stays, what is not taken apart, what can begin to move; a sentence each.
@@ -62,11 +62,10 @@ impl Instructions {
             Instruction { heading, steps, words }
         };
         let (stuck, left_out) = blockers(plan, false);
-        let gone = &plan.initial.removed;
         Self {
             title: account.title(),
             verdict: verdict(plan).map(|verdict| format!("Not complete ({}). {verdict}", plan.status)),
-            gone: (!gone.is_empty()).then(|| format!("Gone before: {}.", part_words(gone, ", "))),
+            before: account.before(),
             list: runs.into_iter().zip(headings).map(instruction).collect(),
             rest: account.rest(),
             stuck,
@@ -117,6 +116,7 @@ impl StepAccount<'_> {
                 let ([a], [b]) = (&first.parts[..], &step.parts[..]) else { return false };
                 self.is_equal(a, b)
                     && self.group(first) == self.group(step)
+                    && has_same_tool(first, step)
                     && run.iter().all(|&other| self.words.is_alike(other, i))
                     && !run.iter().any(|g| step.requires.contains(g))
             };
@@ -150,9 +150,11 @@ impl StepAccount<'_> {
     }
 
     fn run(&self, run: &[usize]) -> String {
-        let after = self.after(run);
+        let steps: Vec<&StepDocument> = run.iter().map(|&i| &self.plan.steps[i]).collect();
+        let tool = with_tool(&steps, self.plan.units.as_deref());
+        let after = format!("{}{}", self.after(run), holding(self.plan, &steps));
         if let [only] = run {
-            return format!("{}{after}", self.words.step(*only));
+            return format!("{}{tool}{after}", self.words.step(*only));
         }
         let names: Vec<&str> =
             run.iter().flat_map(|&i| &self.plan.steps[i].parts).map(String::as_str).collect();
@@ -162,7 +164,18 @@ impl StepAccount<'_> {
         let told = told
             .replace("nothing holds it", "nothing holds them")
             .replace("in its place: it touches", "in place: they touch");
-        format!("{told}, one by one: {list}{after}")
+        format!("{told}{tool}, one by one: {list}{after}")
+    }
+
+    /// What is gone, and what has to be held, before the first step.
+    fn before(&self) -> Option<String> {
+        let gone = &self.plan.initial.removed;
+        let gone = (!gone.is_empty()).then(|| format!("Gone before: {}.", part_words(gone, ", ")));
+        let states: Vec<&StabilityDocument> = self.plan.initial.stability.iter().collect();
+        let held = held(self.plan, &states);
+        let held = (!held.is_empty()).then(|| format!("Hold {} from the start.", part_words(&held, " and ")));
+        let sentences: Vec<String> = gone.into_iter().chain(held).collect();
+        (!sentences.is_empty()).then(|| sentences.join(" "))
     }
 
     /// The parts that the steps of a run require to have moved before.

@@ -14,6 +14,7 @@ mod document;
 mod equal_parts;
 mod explode;
 pub mod glb;
+mod handling;
 mod illustration;
 pub mod instructions;
 pub mod layout;
@@ -31,8 +32,9 @@ mod viewpoint;
 mod words;
 
 pub use colour::{PALETTE, Rgb};
-pub use document::{kind_of, read_plan};
+pub use document::read_plan;
 pub(crate) use equal_parts::equal_parts;
+pub(crate) use handling::tool_name;
 pub use illustration::{Illustration, illustrations};
 pub use instructions::{Instruction, Instructions};
 pub use scene::{DrawnPart, Keyframe, Placement, PlanScene, SceneGroup, ScenePart, SceneStep, Up};

@@ -31,8 +31,8 @@ pub fn sheet(
     if let Some(verdict) = &instructions.verdict {
         let _ = writeln!(body, "<p class=\"verdict\">{}</p>", escaped(verdict));
     }
-    if let Some(gone) = &instructions.gone {
-        let _ = writeln!(body, "<p>{}</p>", escaped(gone));
+    if let Some(before) = &instructions.before {
+        let _ = writeln!(body, "<p>{}</p>", escaped(before));
     }
     let of = |instruction: Option<usize>, name: &str| {
         let is_it =

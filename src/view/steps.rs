@@ -7,13 +7,13 @@ use super::instructions::Instructions;
 /// The instructions as Markdown.
 #[must_use]
 pub fn markdown(instructions: &Instructions) -> String {
-    let Instructions { title, verdict, gone, list, rest, stuck, left_out } = instructions;
+    let Instructions { title, verdict, before, list, rest, stuck, left_out } = instructions;
     let mut text = format!("# {title}\n\n");
     if let Some((mark, why)) = verdict.as_deref().and_then(|verdict| verdict.split_once(". ")) {
         let _ = writeln!(text, "**{mark}.** {why}\n");
     }
-    if let Some(gone) = gone {
-        let _ = writeln!(text, "{gone}\n");
+    if let Some(before) = before {
+        let _ = writeln!(text, "{before}\n");
     }
     for instruction in list {
         if let Some(heading) = &instruction.heading {

@@ -1,7 +1,7 @@
 //! Why a plan is not complete, in two sentences, and the blocked actions that matter.
 
-use super::document::kind_of;
 use super::words::{capital, part_word, part_words};
+use crate::document::kind_of;
 use crate::document::{BlockedDocument, PlanDocument};
 use crate::plan::{PlanKind, PlanStatus, StepEnd};
 

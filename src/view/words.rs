@@ -6,8 +6,8 @@ use std::f64::consts::TAU;
 
 use nalgebra::Vector3;
 
-use super::document::kind_of;
 use super::moves::{Move, MoveKind, NEARLY, QUARTERLY, brought_near, moves, telling};
+use crate::document::kind_of;
 use crate::document::{FreeGroupDocument, PlanDocument, StepDocument};
 use crate::plan::{PlanKind, StepEnd};
 
@@ -320,7 +320,7 @@ fn turned((least, most): (f64, f64)) -> String {
 
 /// Lengths from the least to the most in three digits of the latter, with their unit if known; one number if both are the
 /// same then.
-fn lengths((least, most): (f64, f64), units: Option<&str>) -> String {
+pub(super) fn lengths((least, most): (f64, f64), units: Option<&str>) -> String {
     let digits = 2 - most.max(f64::MIN_POSITIVE).log10().floor() as i32;
     let [a, b] = [least, most].map(|value| match digits {
         _ if value == 0.0 => "0".to_owned(),

@@ -6,9 +6,10 @@ use sbdp::hostile_input::{Reader, field_file};
 use sbdp_ipc::endpoint::Endpoint;
 use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::geometry::{Assembly, Part, Vertices};
-use sbdp_ipc::plan::{MovedPart, PenaltyRecord, PlanRequest, Staging, Step, encode_steps};
+use sbdp_ipc::plan::{Gravity, MovedPart, PenaltyRecord, PlanRequest, Reports, Staging, Step, encode_steps};
 use sbdp_ipc::revision::Revision;
 use sbdp_ipc::status::{Status, StatusHeader};
+use sbdp_ipc::summary::report::{Clearance, Closest, Fastener, Report, Stability, Tool, Unstable};
 use sbdp_ipc::summary::{NO_PART, OverlapRecord, SummaryParts};
 
 /// Longer files say nothing that shorter ones do not, and are read slowly.
@@ -148,6 +149,38 @@ fn messages() -> Vec<Vec<u8>> {
         kept_together: vec![vec![0, 1]],
         free_together: vec![(vec![1, 2], [0.0, 0.0, 1.0])],
         poses: vec![MovedPart { part: 1, ..MovedPart::default() }],
+        report: Some(Report {
+            stability: Some(vec![
+                Stability { needs_friction: 0.25, ..Stability::default() },
+                Stability {
+                    unstable: vec![Unstable {
+                        falls: vec![(0, [0.0, 0.0, -1.0])],
+                        hold: vec![vec![0], vec![0, 1]],
+                        needs_clamping: true,
+                    }],
+                    unknown: vec![1],
+                    ..Stability::default()
+                },
+            ]),
+            clearance: Some(vec![Clearance {
+                touching: vec![1],
+                closest: Some(Closest {
+                    moving: 0,
+                    standing: 1,
+                    distance: 0.5,
+                    at_least: 0.25,
+                    assembled: 2.0,
+                    segment: 3,
+                    share: 0.5,
+                    points: Some([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]),
+                }),
+            }]),
+            tools: Some(vec![Some(Fastener {
+                size: 13.0,
+                tools: vec![Tool { tool: 2, swing: 60.0, needs: 30.0, fits: true, blocked_by: vec![1] }],
+            })]),
+        }),
+        steps: 1,
         ..SummaryParts::default()
     };
     let request = PlanRequest {
@@ -160,6 +193,7 @@ fn messages() -> Vec<Vec<u8>> {
         targets: Some(vec![0]),
         moved: vec![MovedPart { part: 1, ..MovedPart::default() }],
         assembly: Some(Staging::Beside(vec![MovedPart::default()])),
+        reports: Reports { stability: Some(Gravity::default()), clearance: true, tools: true },
         ..PlanRequest::default()
     };
     let status = Status {

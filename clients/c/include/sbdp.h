@@ -1257,6 +1257,23 @@ typedef struct SbdpPlanOptions {
      * How many.
      */
     size_t keep_count;
+    /**
+     * What to report about each step besides its path: the sum of some `SbdpReport`s. `sbdp_plan_json` has the reports.
+     */
+    uint32_t reports;
+    /**
+     * Zero.
+     */
+    uint32_t reserved_reports;
+    /**
+     * With `SBDP_REPORT_STABILITY`: the coefficient of friction of all contacts; null for 0.2.
+     */
+    const double *friction;
+    /**
+     * With `SBDP_REPORT_STABILITY`: the direction against gravity, three numbers, of any length but 0; null for `up`, and
+     * without that for +z.
+     */
+    const double *against_gravity;
 } SbdpPlanOptions;
 
 /**

@@ -184,6 +184,10 @@ struct PlanOptions {
     std::vector<std::vector<std::uint32_t>> groups;
     std::vector<SbdpMovedPart> moved, staged;
     std::vector<SbdpPenalty> penalty;
+    // The sum of some SBDP_REPORT_…: what to report about each step in the plan's JSON.
+    std::uint32_t reports = 0;
+    std::optional<double> friction;
+    std::optional<std::array<double, 3>> against_gravity;
 };
 
 namespace detail {
@@ -227,6 +231,9 @@ template <class F> auto with_options(const PlanOptions &o, F use) {
     c.moved = o.moved.data(), c.moved_count = o.moved.size();
     c.staged = o.staged.data(), c.staged_count = o.staged.size();
     c.penalty = o.penalty.data(), c.penalty_count = o.penalty.size();
+    c.reports = o.reports;
+    c.friction = o.friction ? &*o.friction : nullptr;
+    c.against_gravity = o.against_gravity ? o.against_gravity->data() : nullptr;
     return use(&c);
 }
 

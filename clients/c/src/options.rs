@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use sbdp_client::{
-    ActionSet, Engine, PenaltyParameter, PlanOptions, Planner, Staging, StaticAnalysis, Waypoint,
+    ActionSet, Engine, Gravity, PenaltyParameter, PlanOptions, Planner, Reports, Staging, StaticAnalysis,
+    Waypoint,
 };
 
 use crate::border::Failure;
@@ -121,6 +122,17 @@ pub struct SbdpPenalty {
     pub value: f64,
 }
 
+/// What is reported about each step of a plan.
+#[repr(u32)]
+pub enum SbdpReport {
+    /// What falls before the first step and after each step, and what to hold.
+    Stability = 1,
+    /// How near the step passes other parts.
+    Clearance = 2,
+    /// Which tools turn the nut or screw that the step takes off.
+    Tools = 4,
+}
+
 /// What to plan. All zero except `struct_size` is the default, as is a null pointer. Where zero would have a meaning
 /// of its own, the field is a pointer, and null is the default.
 #[derive(Clone, Copy)]
@@ -200,6 +212,15 @@ pub struct SbdpPlanOptions {
     pub keep: *const u32,
     /// How many.
     pub keep_count: usize,
+    /// What to report about each step besides its path: the sum of some `SbdpReport`s. `sbdp_plan_json` has the reports.
+    pub reports: u32,
+    /// Zero.
+    pub reserved_reports: u32,
+    /// With `SBDP_REPORT_STABILITY`: the coefficient of friction of all contacts; null for 0.2.
+    pub friction: *const f64,
+    /// With `SBDP_REPORT_STABILITY`: the direction against gravity, three numbers, of any length but 0; null for `up`, and
+    /// without that for +z.
+    pub against_gravity: *const f64,
 }
 
 // SAFETY: it begins with its size, and has but numbers and pointers.
@@ -258,11 +279,43 @@ pub(crate) unsafe fn read_plan_options(options: *const SbdpPlanOptions) -> Resul
                 given.staging,
                 &[None, Some(Staging::None), Some(Staging::Beside(staged))],
             )?,
+            reports: reports(&given)?,
             no_cache: given.no_cache != 0,
             batch: given.batch != 0,
             trace: given.trace != 0,
         })
     }
+}
+
+/// # Safety
+/// The pointers of the options are null or valid.
+unsafe fn reports(given: &SbdpPlanOptions) -> Result<Reports, Failure> {
+    const KNOWN: u32 = SbdpReport::Stability as u32 | SbdpReport::Clearance as u32 | SbdpReport::Tools as u32;
+    if given.reports & !KNOWN != 0 {
+        return Err(Failure::argument(&format!(
+            "`options->reports` is {}: this library does not know all",
+            given.reports
+        )));
+    }
+    let has = |report: SbdpReport| given.reports & report as u32 != 0;
+    // SAFETY: so the caller promises.
+    let (friction, against_gravity, up) = unsafe {
+        (
+            optional(given.friction, "options->friction")?,
+            optional(given.against_gravity.cast(), "options->against_gravity")?,
+            optional(given.up.cast(), "options->up")?,
+        )
+    };
+    let usual = Gravity::default();
+    let gravity = Gravity {
+        up: against_gravity.or(up).unwrap_or(usual.up),
+        friction: friction.unwrap_or(usual.friction),
+    };
+    Ok(Reports {
+        stability: has(SbdpReport::Stability).then_some(gravity),
+        clearance: has(SbdpReport::Clearance),
+        tools: has(SbdpReport::Tools),
+    })
 }
 
 /// # Safety

@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use sbdp_client::{
-    ActionSet, Engine, Handle, PenaltyParameter, PlanOptions, Planner, Staging, StaticAnalysis, Waypoint,
+    ActionSet, Engine, Gravity, Handle, PenaltyParameter, PlanOptions, Planner, Reports, Staging,
+    StaticAnalysis, Waypoint,
 };
 use tonic::Status;
 
@@ -56,9 +57,28 @@ pub(crate) fn options(request: &proto::PlanRequest) -> Result<PlanOptions, Statu
         groups: request.groups.iter().map(|group| group.parts.clone()).collect(),
         moved: moved("moved", &request.moved)?,
         assembly: staging(request)?,
+        reports: reports(request)?,
         no_cache: request.no_cache,
         batch: request.batch,
         trace: request.trace,
+    })
+}
+
+fn reports(request: &proto::PlanRequest) -> Result<Reports, Status> {
+    let kinds = request.reports.iter().map(|&number| known::<proto::Report>("reports", number));
+    let kinds = kinds.collect::<Result<Vec<_>, Status>>()?;
+    if !kinds.is_empty() && !request.document {
+        return Err(argument("reports", "they are in the document: set `document`, too"));
+    }
+    let usual = Gravity::default();
+    let gravity = Gravity {
+        up: request.up.map_or(usual.up, |up| [up.x, up.y, up.z]),
+        friction: request.friction.unwrap_or(usual.friction),
+    };
+    Ok(Reports {
+        stability: kinds.contains(&proto::Report::Stability).then_some(gravity),
+        clearance: kinds.contains(&proto::Report::Clearance),
+        tools: kinds.contains(&proto::Report::Tools),
     })
 }
 
@@ -139,6 +159,8 @@ mod tests {
             ("engine", PlanRequest { engine: -1, ..PlanRequest::default() }),
             ("actions", PlanRequest { actions: 3, ..PlanRequest::default() }),
             ("static_analysis", PlanRequest { static_analysis: i32::MAX, ..PlanRequest::default() }),
+            ("reports", PlanRequest { reports: vec![4], document: true, ..PlanRequest::default() }),
+            ("reports", PlanRequest { reports: vec![1], ..PlanRequest::default() }),
             ("staging", PlanRequest { staging: 3, ..PlanRequest::default() }),
             ("staged", PlanRequest { staged: vec![nowhere], ..PlanRequest::default() }),
             ("moved[0].motion", PlanRequest { moved: vec![nowhere], ..PlanRequest::default() }),

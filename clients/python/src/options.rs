@@ -6,7 +6,8 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 use sbdp_client::{
-    ActionSet, Engine, PenaltyParameter, PlanOptions, Planner, Staging, StaticAnalysis, Waypoint,
+    ActionSet, Engine, Gravity, PenaltyParameter, PlanOptions, Planner, Reports, Staging, StaticAnalysis,
+    Waypoint,
 };
 
 use crate::assembly::Data;
@@ -82,6 +83,27 @@ fn direction(value: &Bound<'_, PyAny>) -> PyResult<Option<[f64; 3]>> {
     one_of("up", value, &axes).map(Some)
 }
 
+/// A report about each step.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum ReportKind {
+    Stability,
+    Clearance,
+    Tools,
+}
+
+/// The reports that are wanted; one word may stand alone.
+fn report_kinds(value: &Bound<'_, PyAny>) -> PyResult<Vec<ReportKind>> {
+    let words = [
+        ("stability", ReportKind::Stability),
+        ("clearance", ReportKind::Clearance),
+        ("tools", ReportKind::Tools),
+    ];
+    match value.cast::<PyString>() {
+        Ok(word) => Ok(vec![one_of("report", word, &words)?]),
+        Err(_) => value.try_iter()?.map(|word| one_of("report", &word?, &words)).collect(),
+    }
+}
+
 /// The groups that the assembly's files name.
 fn groups(py: Python<'_>, data: &Data) -> PyResult<Vec<Vec<u32>>> {
     let named = data.files().map(|(assembly, _)| &assembly.groups[..]).unwrap_or_default();
@@ -111,6 +133,7 @@ pub(crate) fn options(
 ) -> PyResult<PlanOptions> {
     let mut options = PlanOptions::default();
     let (mut actions, mut together, mut staging) = (None, false, None);
+    let (mut reported, mut friction) = (Vec::new(), Gravity::default().friction);
     for (key, value) in keywords.into_iter().flatten() {
         let key: String = key.extract()?;
         match key.as_str() {
@@ -157,6 +180,8 @@ pub(crate) fn options(
             "assembly" => together = value.extract()?,
             "staging" => staging = Some(value),
             "up" => options.up = direction(&value)?,
+            "report" => reported = report_kinds(&value)?,
+            "friction" => friction = value.extract()?,
             "groups" => {
                 if one_of(&key, &value, &[("needed", false), ("prefer", true)])? {
                     options.groups = groups(py, data)?;
@@ -186,6 +211,14 @@ pub(crate) fn options(
             }
         }
     }
+    let up = options.up.unwrap_or_else(|| {
+        data.files().map_or([0.0, 0.0, 1.0], |(assembly, _)| sbdp::files::customary_up(assembly))
+    });
+    options.reports = Reports {
+        stability: reported.contains(&ReportKind::Stability).then_some(Gravity { up, friction }),
+        clearance: reported.contains(&ReportKind::Clearance),
+        tools: reported.contains(&ReportKind::Tools),
+    };
     if staging.is_some() && !together {
         return Err(PyValueError::new_err("staging: only assembly plans have it; give assembly=True"));
     }

@@ -17,7 +17,7 @@ impl Summary {
     #[must_use]
     pub fn document(&self, steps: &[Step]) -> PlanDocument {
         let poses = self.poses.iter().map(|(part, pose)| (self.part_name(*part).to_owned(), *pose));
-        PlanDocument {
+        let document = PlanDocument {
             schema: SCHEMA.to_owned(),
             kind: if self.assembly { "assembly" } else { "disassembly" }.to_owned(),
             source: None,
@@ -28,7 +28,11 @@ impl Summary {
             units: self.units.clone(),
             parts: self.parts.clone(),
             groups: Vec::new(),
-            initial: InitialDocument { removed: self.names(&self.removed), poses: poses.collect() },
+            initial: InitialDocument {
+                removed: self.names(&self.removed),
+                poses: poses.collect(),
+                stability: None,
+            },
             targets: self.targets.as_ref().map(|targets| self.names(targets)),
             fixed: self.names(&self.fixed),
             keep: self.names(&self.keep),
@@ -68,6 +72,10 @@ impl Summary {
                 })
                 .collect(),
             stats: stats(&self.stats),
+        };
+        match &self.report {
+            Some(report) => document.with_report(report),
+            None => document,
         }
     }
 
@@ -101,6 +109,9 @@ impl Summary {
             requires: step.requires.iter().map(|&number| number as usize).collect(),
             wave: step.wave as usize,
             direction: step.direction,
+            stability: None,
+            clearance: None,
+            tools: None,
         }
     }
 }

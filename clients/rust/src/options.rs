@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use sbdp_ipc::clock;
-use sbdp_ipc::plan::{self, MovedPart, PENALTY_PARAMETERS, PenaltyRecord, PlanRequest, Waypoint};
+use sbdp_ipc::plan::{self, MovedPart, PENALTY_PARAMETERS, PenaltyRecord, PlanRequest, Reports, Waypoint};
 use sbdp_ipc::polling;
 
 use crate::interrupt::Interrupt;
@@ -243,6 +243,8 @@ pub struct PlanOptions {
     /// Make an assembly plan (the disassembly reversed, with each part's path from where it waits), with
     /// parts that begin there.
     pub assembly: Option<Staging>,
+    /// What to report about each step besides its path: [`Summary::report`](crate::Summary::report).
+    pub reports: Reports,
     /// Neither read nor write the cache.
     pub no_cache: bool,
     /// Other requests come first: no one waits for this plan.
@@ -280,6 +282,7 @@ impl PlanOptions {
             keep: self.keep.clone(),
             groups: self.groups.clone(),
             moved: self.moved.iter().map(moved_part).collect(),
+            reports: self.reports,
             assembly: self.assembly.as_ref().map(|staging| match staging {
                 Staging::None => plan::Staging::None,
                 Staging::Beside(given) => plan::Staging::Beside(given.iter().map(moved_part).collect()),

@@ -2,6 +2,7 @@
 
 use sbdp_ipc::bytes::Malformed;
 use sbdp_ipc::plan::Waypoint;
+use sbdp_ipc::summary::report::Report;
 use sbdp_ipc::summary::{STATUSES, Stats, SummaryView};
 
 /// How planning ended.
@@ -124,6 +125,8 @@ pub struct Summary {
     pub overlaps: Vec<Overlap>,
     /// Findings about the input.
     pub warnings: Vec<Warning>,
+    /// What the plan means where it is carried out, if the request asked for it.
+    pub report: Option<Report>,
     /// Counters and times.
     pub stats: Stats,
 }
@@ -154,6 +157,7 @@ impl Summary {
             blocked: view.blocked().map(blocked).collect(),
             overlaps: view.overlaps().iter().map(|o| Overlap { parts: o.parts, depth: o.depth }).collect(),
             warnings: view.warnings().map(|(part, m)| Warning { part, message: m.to_owned() }).collect(),
+            report: view.report().to_report(),
             stats: view.stats(),
         })
     }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use sbdp_ipc::summary::report;
 use sbdp_ipc::{bytes, error, geometry, headers, plan, progress, revision, status, summary};
 
 use crate::source::{Kind, Source, Struct};
@@ -49,6 +50,13 @@ impl<'s> Layouts<'s> {
             plan::StepRecord,
             plan::StepsHeader,
             progress::ProgressSample,
+            report::ClearanceRecord,
+            report::FallRecord,
+            report::FastenerRecord,
+            report::HoldRecord,
+            report::StabilityRecord,
+            report::ToolRecord,
+            report::UnstableRecord,
             revision::RevisionHeader,
             status::PreloadRecord,
             status::StatusHeader,

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use sbdp_ipc::summary::report;
 use sbdp_ipc::{bytes, endpoint, geometry, headers, layout, plan, progress, revision, summary};
 
 use crate::source::Source;
@@ -75,6 +76,9 @@ fn groups() -> Vec<Group> {
                 plan::PLAN_TRACE,
                 plan::PLAN_HAS_CLEARANCE,
                 plan::PLAN_HAS_UP,
+                plan::PLAN_REPORT_STABILITY,
+                plan::PLAN_REPORT_CLEARANCE,
+                plan::PLAN_REPORT_TOOLS,
             ],
         ),
         (
@@ -95,7 +99,19 @@ fn groups() -> Vec<Group> {
                 summary::SUMMARY_HAS_TARGETS,
                 summary::SUMMARY_ASSEMBLY,
                 summary::SUMMARY_HAS_BASE_REASON,
+                summary::SUMMARY_HAS_STABILITY,
+                summary::SUMMARY_HAS_CLEARANCE,
+                summary::SUMMARY_HAS_TOOLS,
                 summary::NO_PART,
+            ],
+        ),
+        (
+            "flags of reports",
+            values![
+                report::UNSTABLE_NEEDS_CLAMPING,
+                report::CLEARANCE_HAS_CLOSEST,
+                report::CLEARANCE_HAS_POINTS,
+                report::TOOL_FITS,
             ],
         ),
         ("stages", values![progress::STAGE_SDF, progress::STAGE_SEARCH, progress::STAGE_TRANSFER]),
@@ -111,6 +127,7 @@ fn lists() -> Vec<(&'static str, Vec<&'static str>)> {
         plan::STATIC_ANALYSES,
         plan::PENALTY_PARAMETERS,
         summary::STATUSES,
+        report::TOOLS,
     ]
 }
 
@@ -120,8 +137,9 @@ fn lists() -> Vec<(&'static str, Vec<&'static str>)> {
 /// A constant of the contract is in no table.
 pub(crate) fn tables(source: &Source) -> Vec<(String, String)> {
     let mut tables = Vec::new();
-    // What is not on the wire: how long the Rust client polls, and the JSON of plans (src/document/JSON.md).
-    let mut told = BTreeSet::from(["USUAL", "SCHEMA"]);
+    // What is not on the wire: how long the Rust client polls, the JSON of plans (src/document/JSON.md), and the friction where
+    // the caller gives none.
+    let mut told = BTreeSet::from(["USUAL", "SCHEMA", "FRICTION"]);
     for (name, values) in groups() {
         let mut text = "| constant | value | meaning |\n|---|---:|---|\n".to_owned();
         for (name, value) in values {

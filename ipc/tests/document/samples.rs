@@ -1,5 +1,6 @@
 //! One message of each kind with something in every section, taken apart as the document says.
 
+use bytemuck::Zeroable;
 use sbdp_ipc::bytes::Text;
 use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::geometry::{Assembly, HandleResponse, Part, PartRecord, VERTICES_F32, VERTICES_F64, Vertices};
@@ -8,7 +9,13 @@ use sbdp_ipc::plan::{
 };
 use sbdp_ipc::revision::{ADDED, Revision};
 use sbdp_ipc::status::{PreloadRecord, Status, StatusHeader};
-use sbdp_ipc::summary::{BlockedRecord, GroupRecord, OverlapRecord, Stats, SummaryParts, WarningRecord};
+use sbdp_ipc::summary::report::{
+    Clearance, ClearanceRecord, Closest, FallRecord, Fastener, FastenerRecord, HoldRecord, Report, Stability,
+    Tool, ToolRecord, Unstable, UnstableRecord,
+};
+use sbdp_ipc::summary::{
+    BlockedRecord, GroupRecord, NO_PART, OverlapRecord, Stats, SummaryParts, WarningRecord,
+};
 
 use crate::layout::Layouts;
 use crate::messages;
@@ -157,6 +164,31 @@ fn steps_have_their_sections_in_order() {
     check("Steps", &encode_steps(7, [&step]), expected);
 }
 
+fn report() -> Report {
+    let unstable = Unstable {
+        falls: vec![(0, [0.0, 0.0, -1.0])],
+        hold: vec![vec![0], vec![0, 1]],
+        needs_clamping: true,
+    };
+    let state = Stability { unstable: vec![unstable], unknown: vec![1], ..Stability::default() };
+    let closest = Closest {
+        moving: 0,
+        standing: 1,
+        distance: 0.5,
+        at_least: 0.25,
+        assembled: 2.0,
+        segment: 3,
+        share: 0.5,
+        points: Some([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]),
+    };
+    let tool = Tool { tool: 2, swing: 60.0, needs: 30.0, fits: true, blocked_by: vec![1] };
+    Report {
+        stability: Some(vec![Stability::default(), state, Stability::default()]),
+        clearance: Some(vec![Clearance { touching: vec![1], closest: Some(closest) }, Clearance::default()]),
+        tools: Some(vec![None, Some(Fastener { size: 13.0, tools: vec![tool] })]),
+    }
+}
+
 #[test]
 fn a_summary_has_its_sections_in_order() {
     let overlap = OverlapRecord { parts: [0, 1], depth: 0.25 };
@@ -181,12 +213,36 @@ fn a_summary_has_its_sections_in_order() {
         kept_together: vec![vec![21, 22]],
         free_together: vec![(vec![23], [0.0, 0.0, 1.0])],
         poses: vec![moved(1)],
+        report: Some(report()),
         stats: Stats::default(),
     };
     let blocked = BlockedRecord { part: 1, first_blocker: 0, blockers: 2, action: text(3, 2) };
     let warning = WarningRecord { part: 0, message: text(5, 7) };
     let kept = GroupRecord { first_part: 0, parts: 2, direction: [0.0; 3] };
     let free = GroupRecord { first_part: 2, parts: 1, direction: [0.0, 0.0, 1.0] };
+    let passing = ClearanceRecord {
+        flags: 3,
+        moving: 0,
+        standing: 1,
+        segment: 3,
+        first_touching: 4,
+        touching: 1,
+        distance: 0.5,
+        at_least: 0.25,
+        assembled: 2.0,
+        share: 0.5,
+        moving_point: [1.0, 2.0, 3.0],
+        standing_point: [4.0, 5.0, 6.0],
+    };
+    let alone = ClearanceRecord {
+        moving: NO_PART,
+        standing: NO_PART,
+        first_touching: 5,
+        ..ClearanceRecord::zeroed()
+    };
+    let without = FastenerRecord { first_tool: 0, tools: 0, size: 0.0 };
+    let fastener = FastenerRecord { first_tool: 0, tools: 1, size: 13.0 };
+    let tool = ToolRecord { tool: 2, flags: 1, first_blocker: 5, blockers: 1, swing: 60.0, needs: 30.0 };
     let expected: &[(&str, Vec<u8>)] = &[
         ("part names", raw(&[text(0, 1), text(1, 2)])),
         ("blocked", raw(&[blocked])),
@@ -203,6 +259,24 @@ fn a_summary_has_its_sections_in_order() {
         ("blockers", raw::<u32>(&[11, 12])),
         ("poses", raw(&[moved(1)])),
         ("parts of groups", raw::<u32>(&[21, 22, 23])),
+        ("states", raw(&[[0_u32; 6], [0, 0, 0, 1, 3, 1], [0, 0, 1, 0, 4, 0]])),
+        (
+            "unstable",
+            raw(&[UnstableRecord {
+                first_fall: 0,
+                falls: 1,
+                first_hold: 0,
+                holds: 2,
+                flags: 1,
+                reserved: 0,
+            }]),
+        ),
+        ("falls", raw(&[FallRecord { part: 0, reserved: 0, direction: [0.0, 0.0, -1.0] }])),
+        ("holds", raw(&[HoldRecord { first_part: 0, parts: 1 }, HoldRecord { first_part: 1, parts: 2 }])),
+        ("clearances", raw(&[passing, alone])),
+        ("fasteners", raw(&[without, fastener])),
+        ("tools", raw(&[tool])),
+        ("parts of the report", raw::<u32>(&[0, 0, 1, 1, 1, 1])),
         ("texts", raw(b"abc+xwarningwhyplannerenginemmbig")),
     ];
     check("Summary", &summary.encode(), expected);

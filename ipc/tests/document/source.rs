@@ -1,7 +1,7 @@
 //! The definitions of the wire contract as they stand in `ipc/src`, with their comments.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use syn::{Attribute, Expr, Fields, Item, Lit, Meta, Type};
 
@@ -52,13 +52,18 @@ pub(crate) struct Source {
     aliases: BTreeMap<String, Kind>,
 }
 
+/// The files of a folder and of those in it.
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    entries.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect()
+}
+
 impl Source {
     /// Reads all modules but those whose constants do not travel.
     pub(crate) fn read() -> Self {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
         let mut source = Self::default();
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
+        for path in files(&folder) {
             let file = syn::parse_file(&std::fs::read_to_string(&path).unwrap()).unwrap();
             for item in file.items {
                 source.add(item);

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use sbdp_ipc::plan::FRICTION;
+
 use super::poses::{direction as vector, not_negative};
 
 /// A plan, and how its parts stand.
@@ -16,7 +18,7 @@ pub(in crate::cli) struct StandingArguments {
     #[arg(long, value_name = "ASSEMBLY")]
     pub(in crate::cli) meshes: Option<PathBuf>,
     /// Coefficient of friction of all contacts: 0.2 is dry machined steel at the lower end, 0.05 oiled steel, 0.5 rubber
-    #[arg(long, value_name = "MU", default_value_t = 0.2, value_parser = not_negative, allow_negative_numbers = true)]
+    #[arg(long, value_name = "MU", default_value_t = FRICTION, value_parser = not_negative, allow_negative_numbers = true)]
     pub(in crate::cli) friction: f64,
     /// Gap up to which two surfaces count as touching, in the input's units [default: a hundredth of the longest side of
     /// the smaller part]

@@ -10,11 +10,11 @@ use nalgebra::{Point3, UnitQuaternion, Vector3};
 use serde::Serialize;
 
 use super::colour::colours;
-use super::document::kind_of;
 use super::explode::{exploded_parts, spread};
 use super::verdict::verdict;
 use super::words::{free_together, kept_together};
 use super::{PALETTE, Rgb, ViewError};
+use crate::document::kind_of;
 use crate::document::{BlockedDocument, Placements, PlanDocument};
 use crate::geometry::{Assembly, Bounds};
 use crate::plan::{PlanKind, PlanStatus};

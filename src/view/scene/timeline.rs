@@ -2,11 +2,11 @@
 
 use nalgebra::Point3;
 
-use super::super::document::kind_of;
 use super::super::explode::Leaving;
 use super::super::words::{Words, required};
 use super::builder::SceneBuilder;
 use super::{Keyframe, ScenePart, SceneStep};
+use crate::document::kind_of;
 use crate::document::{Placements, StepFrame};
 use crate::geometry::{Bounds, Pose, interpolate, pose_from_waypoint};
 use crate::plan::{PlanKind, StepEnd};

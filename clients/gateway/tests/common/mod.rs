@@ -197,7 +197,7 @@ impl Gateway {
         let mut grpc = tonic::client::Grpc::new(self.channel().await);
         grpc.ready().await.unwrap();
         let codec = tonic_prost::ProstCodec::<StatusRequest, StatusReply>::default();
-        let path = "/sbdp.v9.PlannerService/Status".parse().unwrap();
+        let path = "/sbdp.v10.PlannerService/Status".parse().unwrap();
         grpc.unary(tonic::Request::new(StatusRequest {}), path, codec).await.unwrap_err()
     }
 }

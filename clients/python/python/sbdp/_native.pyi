@@ -13,6 +13,8 @@ VERSION: str
 Pose = Sequence[float] | NDArray[numpy.floating[Any]]
 """[x, y, z], or [x, y, z, qw, qx, qy, qz]: the rigid motion x' = q x + t."""
 
+Report = Literal["stability", "clearance", "tools"]
+
 class Options(TypedDict, total=False):
     """Options of a plan, named as those of `sbdp plan`. Times are in seconds, lengths in the input's units."""
 
@@ -37,8 +39,9 @@ class Options(TypedDict, total=False):
     targets: str | Iterable[str] | None
     """Parts that must come out; None for all."""
     base: str | Iterable[str]
-    keep: str | Iterable[str]
     """Parts that stay as long as others leave."""
+    keep: str | Iterable[str]
+    """Parts that stay unless others that are asked for cannot leave otherwise."""
     moved: Mapping[str, Pose]
     """Parts that stand elsewhere: the rigid motion of their mesh from where the assembly has it."""
     assembly: bool
@@ -48,6 +51,11 @@ class Options(TypedDict, total=False):
     these poses."""
     up: Literal["+x", "-x", "+y", "-y", "+z", "-z"] | Sequence[float] | None
     """The direction up: upward paths come before sideways ones, and these before downward ones."""
+    report: Report | Iterable[Report]
+    """What to report about each step besides its path: `stability`, `clearance` and `tools` of `steps` in `Plan.to_dict()`.
+    Gravity acts against `up`; without it, against +z (+y of glTF scenes)."""
+    friction: float
+    """With the report "stability": the coefficient of friction of all contacts, 0.2 by default."""
     groups: Literal["needed", "prefer"]
     """"prefer": groups that the files name leave as wholes, as long as anything else leaves."""
     no_cache: bool
