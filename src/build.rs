@@ -39,7 +39,7 @@ const STAGES: [(&str, &str); 25] = [
     ("assembling", "contact geometry plan rrt scene search termination"),
     (
         "service",
-        "assembling blocking_graph cache contact fasteners geometry lru plan scene sdf search simulation statics termination tolerances tools",
+        "assembling blocking_graph budgets cache contact fasteners geometry lru plan scene sdf search simulation statics termination tolerances tools",
     ),
     ("document", "files geometry ipc plan"),
     ("report", "document geometry ipc plan service statics termination tools"),

@@ -103,3 +103,105 @@ fn too_few_arms_to_hold_and_plans_with_a_fixed_order_are_refused_with_what_to_do
     assert_eq!(refused.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&refused.stderr).contains("plan the disassembly"), "{refused:?}");
 }
+
+#[test]
+fn a_line_has_all_steps_in_order_and_more_stations_are_faster() {
+    let folder = bracket(&["--steady", "--up=-z"]);
+    let plan: Value = serde_json::from_slice(&fs::read(folder.path().join("plan.json")).unwrap()).unwrap();
+    let steps = plan["steps"].as_array().unwrap().len();
+    let mut last = f64::INFINITY;
+    for count in [1, 2, 3, steps, steps + 2] {
+        let found = scheduled(folder.path(), &["--stations", &count.to_string(), "--up=-z"]);
+        assert_eq!(found["schema"], "sbdp-line/1");
+        let stations = found["stations"].as_array().unwrap();
+        assert_eq!(stations.len(), count);
+        let in_order: Vec<u64> = stations
+            .iter()
+            .flat_map(|station| station["steps"].as_array().unwrap())
+            .map(|step| step.as_u64().unwrap())
+            .collect();
+        assert_eq!(in_order, (0..steps as u64).collect::<Vec<_>>());
+        let seconds: Vec<f64> = stations.iter().map(|station| station["seconds"].as_f64().unwrap()).collect();
+        let (cycle, work) = (found["cycle"].as_f64().unwrap(), found["work"].as_f64().unwrap());
+        assert_eq!(cycle, seconds.iter().copied().fold(0.0, f64::max));
+        assert!((seconds.iter().sum::<f64>() - work).abs() < 1e-9 && cycle >= work / count as f64 - 1e-9);
+        assert!(cycle <= last, "{count} stations: {cycle}, fewer: {last}");
+        last = cycle;
+        // Upside down something hangs by its nut, and is held while that comes off.
+        let hands = stations.iter().map(|station| station["hands"].as_u64().unwrap()).max();
+        assert_eq!(hands, Some(2), "{found}");
+    }
+    let refused = sbdp(folder.path(), &["schedule", "plan.json", "--stations", "2", "--arms", "2"]);
+    assert_eq!(refused.status.code(), Some(2), "{refused:?}");
+}
+
+/// The actions of a domain in STRIPS: the name of each, and the names in its precondition and its effect.
+fn actions(domain: &str) -> Vec<(String, Vec<String>, Vec<String>)> {
+    let without_comments: Vec<&str> =
+        domain.lines().map(|line| line.split(';').next().unwrap_or_default()).collect();
+    let text = without_comments.join(" ");
+    let depth = |c: char| i32::from(c == '(') - i32::from(c == ')');
+    assert_eq!(text.chars().map(depth).sum::<i32>(), 0, "{text}");
+    let facts = |text: &str| -> Vec<String> {
+        let names = text.split(['(', ')', ' ']).filter(|word| word.starts_with("done-"));
+        names.map(str::to_owned).collect()
+    };
+    let action = |text: &str| {
+        let (name, rest) = text.trim().split_once(' ').unwrap();
+        let (before, effect) = rest.split_once(":effect").unwrap();
+        (name.to_owned(), facts(before), facts(effect))
+    };
+    text.split("(:action").skip(1).map(action).collect()
+}
+
+#[test]
+fn the_same_precedence_is_written_as_dot_json_and_pddl() {
+    let folder = bracket(&[]);
+    let plan: Value = serde_json::from_slice(&fs::read(folder.path().join("plan.json")).unwrap()).unwrap();
+    let steps = plan["steps"].as_array().unwrap();
+    let read = |file: &str| {
+        let found = sbdp(folder.path(), &["precedence", "plan.json", "-o", file]);
+        assert!(found.status.success(), "{found:?}");
+        fs::read_to_string(folder.path().join(file)).unwrap()
+    };
+    let json: Value = serde_json::from_str(&read("order.json")).unwrap();
+    let numbers = |list: &Value| -> Vec<usize> {
+        list.as_array().unwrap().iter().map(|step| step.as_u64().unwrap() as usize).collect()
+    };
+    let after: Vec<Vec<usize>> =
+        json["steps"].as_array().unwrap().iter().map(|step| numbers(&step["after"])).collect();
+    // What comes before a step, in turn, is what it requires, in turn; and no entry is among those of another.
+    let all = |direct: &dyn Fn(usize) -> Vec<usize>, step: usize| {
+        let (mut found, mut open) = (std::collections::BTreeSet::new(), direct(step));
+        while let Some(before) = open.pop() {
+            if found.insert(before) {
+                open.extend(direct(before));
+            }
+        }
+        found
+    };
+    let requires = |step: usize| numbers(&steps[step]["requires"]);
+    let directly = |step: usize| after[step].clone();
+    for (step, before_it) in after.iter().enumerate() {
+        assert_eq!(all(&requires, step), all(&directly, step));
+        for before in before_it {
+            assert!(before_it.iter().all(|&other| !all(&directly, other).contains(before)), "step {step}");
+        }
+    }
+    let dot = read("order.dot");
+    assert_eq!(dot.matches(" -> ").count(), after.iter().map(Vec::len).sum::<usize>());
+    assert_eq!(dot.matches("[label=").count(), steps.len());
+
+    let problem = read("order.pddl");
+    let actions = actions(&fs::read_to_string(folder.path().join("order-domain.pddl")).unwrap());
+    assert_eq!(actions.len(), steps.len());
+    for (step, (name, before, effect)) in actions.iter().enumerate() {
+        assert_eq!(name, &format!("step-{}", step + 1));
+        let done = |step: usize| format!("done-{}", step + 1);
+        assert_eq!(before, &after[step].iter().map(|&step| done(step)).collect::<Vec<_>>());
+        assert_eq!(effect, &[done(step)]);
+        assert!(problem.contains(&format!("({})", done(step))), "{problem}");
+    }
+    let refused = sbdp(folder.path(), &["precedence", "plan.json", "-o", "order.txt"]);
+    assert_eq!(refused.status.code(), Some(2), "{refused:?}");
+}

@@ -1,5 +1,7 @@
 //! `sbdp statics`, from outside.
 
+mod common;
+
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -107,16 +109,16 @@ fn a_bolt_follows_its_nut_where_it_would_have_to_be_held() {
         found.stdout
     };
     let bracket = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/assemblies/bolted-bracket-20");
-    run(&["plan", bracket, "--embedded", "-q", "--json", "plan.json"]);
-    let read = |text: &[u8]| serde_json::from_slice::<Value>(text).unwrap();
     // Upside down, so that bolts hang by their nuts.
-    let statics = ["--up=-z", "--json", "-"];
-    let before = read(&run(&[&["statics", "plan.json"][..], &statics].concat()));
-    let after = read(&run(&[&["statics", "plan.json", "--reorder", "steady.json"][..], &statics].concat()));
-    let most = |document: &Value| hands(&document["states"]).into_iter().max().unwrap();
-    assert!(most(&after) < most(&before), "{} before, {} after", most(&before), most(&after));
-    // The states are those of the new plan, which has the same steps, each after those that it requires.
-    assert_eq!(read(&run(&[&["statics", "steady.json"][..], &statics].concat())), after);
+    let plan = ["plan", bracket, "--embedded", "-q", "--up=-z", "--json"];
+    run(&[&plan[..], &["plan.json"]].concat());
+    run(&[&plan[..], &["steady.json", "--steady"]].concat());
+    let read = |text: &[u8]| serde_json::from_slice::<Value>(text).unwrap();
+    let [before, after] = ["plan.json", "steady.json"]
+        .map(|plan| read(&run(&["statics", plan, "--up=-z", "--json", "-"])))
+        .map(|document| hands(&document["states"]).into_iter().max().unwrap());
+    assert!(after < before, "{before} before, {after} after");
+    // It has the same steps, each after those that it requires.
     let [plan, steady] =
         ["plan.json", "steady.json"].map(|file| read(&fs::read(folder.path().join(file)).unwrap()));
     let paths = |plan: &Value| {
@@ -143,14 +145,46 @@ fn a_bolt_follows_its_nut_where_it_would_have_to_be_held() {
     assert_eq!(required(&plan), required(&steady));
 }
 
+/// With so many hands as an order needs there is one, and with fewer the plan ends early and says why; in the same way from
+/// the daemon, and put together.
 #[test]
-fn plans_whose_order_is_fixed_are_not_reordered() {
+fn a_plan_ends_where_it_needs_more_hands() {
     let folder = tempfile::tempdir().unwrap();
-    states(folder.path(), &counterweight(), &["--base", "table", "--assembly"], &[]);
-    let refused = sbdp(folder.path(), &["statics", "plan.json", "--reorder", "steady.json"]);
-    assert_eq!(refused.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&refused.stderr).contains("plan the disassembly"), "{refused:?}");
-    assert!(!folder.path().join("steady.json").exists());
+    let daemon = common::Daemon::start();
+    let bracket = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/assemblies/bolted-bracket-20");
+    let planned = |backend: &str, options: &[&str]| {
+        let command = &mut Command::new(env!("CARGO_BIN_EXE_sbdp"));
+        command.env("SBDP_CACHE_DIR", folder.path().join("cache")).current_dir(folder.path());
+        command.env("SBDP_RUNTIME_DIR", daemon.runtime_dir());
+        let plan = ["plan", bracket, backend, "-q", "--up=-z", "--report", "stability", "--json", "-"];
+        let found = command.args(plan).args(options).output().unwrap();
+        (found.status.code(), serde_json::from_slice::<Value>(&found.stdout).unwrap())
+    };
+    let most = |plan: &Value| {
+        let states: Vec<Value> =
+            plan["steps"].as_array().unwrap().iter().map(|s| s["stability"].clone()).collect();
+        hands(&Value::Array(states)).into_iter().max().unwrap_or(0)
+    };
+    let (_, steady) = planned("--embedded", &["--steady"]);
+    let needed = most(&steady) + 1;
+    for backend in ["--embedded", "--daemon"] {
+        let (code, plan) = planned(backend, &["--hands", &needed.to_string()]);
+        assert_eq!((code, plan["status"].as_str()), (Some(0), Some("complete")));
+        assert_eq!(plan["steps"], steady["steps"], "{backend}");
+        let (code, plan) = planned(backend, &["--hands", &(needed - 1).to_string()]);
+        assert_eq!((code, plan["status"].as_str()), (Some(3), Some("exhausted")));
+        let reason = plan["reason"].as_str().unwrap();
+        assert!(reason.contains("hand") && reason.contains("to hold"), "{reason}");
+        assert!(most(&plan) + 1 < needed, "{plan}");
+        let count = |list: &str| plan[list].as_array().unwrap().len();
+        assert_eq!(count("steps") + count("remaining"), count("parts"));
+    }
+    let (_, together) = planned("--embedded", &["--steady", "--assembly"]);
+    let order = |plan: &Value| -> Vec<Value> {
+        plan["steps"].as_array().unwrap().iter().map(|step| step["parts"].clone()).collect()
+    };
+    let backwards: Vec<Value> = order(&together).into_iter().rev().collect();
+    assert_eq!(backwards, order(&steady));
 }
 
 #[test]

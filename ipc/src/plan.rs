@@ -1,6 +1,7 @@
 //! Plan requests, and steps as they stream back.
 
 use std::mem::offset_of;
+use std::num::NonZeroU32;
 
 use bytemuck::{Pod, Zeroable};
 
@@ -41,6 +42,8 @@ pub const PLAN_REPORT_STABILITY: u32 = 1024;
 pub const PLAN_REPORT_CLEARANCE: u32 = 2048;
 /// Report which tools turn the fasteners that the steps take off.
 pub const PLAN_REPORT_TOOLS: u32 = 4096;
+/// Put the steps into an order in which few parts have to be held at once, with the header's `hands` as a limit.
+pub const PLAN_STEADY: u32 = 8192;
 
 /// Names of the planners; the wire carries the index.
 pub const PLANNERS: [&str; 7] = ["sbdp-star", "sbdp", "pdp-t", "pdp-r", "pdp-star", "rrt", "bk-rrt"];
@@ -86,7 +89,7 @@ pub struct PlanRequestHeader {
     pub actions: u32,
     /// [`PLAN_NO_CACHE`], [`PLAN_HAS_TARGETS`], [`PLAN_SWEEPS`], [`PLAN_NO_SWEEPS`], [`PLAN_BATCH`],
     /// [`PLAN_ASSEMBLY`], [`PLAN_NO_STAGING`], [`PLAN_TRACE`], [`PLAN_HAS_CLEARANCE`], [`PLAN_HAS_UP`],
-    /// [`PLAN_REPORT_STABILITY`], [`PLAN_REPORT_CLEARANCE`], [`PLAN_REPORT_TOOLS`].
+    /// [`PLAN_REPORT_STABILITY`], [`PLAN_REPORT_CLEARANCE`], [`PLAN_REPORT_TOOLS`], [`PLAN_STEADY`].
     pub flags: u32,
     /// Threads for this request; 0 leaves it to the daemon.
     pub threads: u32,
@@ -110,8 +113,9 @@ pub struct PlanRequestHeader {
     pub groups: u32,
     /// How many parts stay unless others cannot leave otherwise.
     pub keep: u32,
-    /// Reserved, 0.
-    pub reserved: u32,
+    /// With [`PLAN_STEADY`]: how many parts hands can hold at once, the one that moves included; 0 for any number. 0 without
+    /// it.
+    pub hands: u32,
     /// The deadline of the answer, in nanoseconds of CLOCK_MONOTONIC; 0 for none.
     pub deadline_ns: u64,
     /// Simulations after which to give up; `u64::MAX` for no limit.
@@ -127,9 +131,10 @@ pub struct PlanRequestHeader {
     pub clearance: f64,
     /// The direction up, in the input's frame, of any length but 0; ignored without [`PLAN_HAS_UP`].
     pub up: [f64; 3],
-    /// The coefficient of friction of all contacts, from 0 up; 0 without [`PLAN_REPORT_STABILITY`].
+    /// The coefficient of friction of all contacts, from 0 up; 0 without [`PLAN_REPORT_STABILITY`] and [`PLAN_STEADY`].
     pub friction: f64,
-    /// The direction against gravity, in the input's frame, of any length but 0; 0 without [`PLAN_REPORT_STABILITY`].
+    /// The direction against gravity, in the input's frame, of any length but 0; 0 without [`PLAN_REPORT_STABILITY`] and
+    /// [`PLAN_STEADY`].
     pub against_gravity: [f64; 3],
 }
 
@@ -239,12 +244,20 @@ pub enum Staging {
 /// What to report about each step of a plan besides its path.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Reports {
-    /// How the parts stand, if wanted.
-    pub stability: Option<Gravity>,
+    /// What falls before the first step and after each step, and what to hold.
+    pub stability: bool,
     /// How near it passes other parts.
     pub clearance: bool,
     /// Which tools turn the fastener that it takes off.
     pub tools: bool,
+}
+
+/// An order of steps in which few parts have to be held at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Steady {
+    /// How many parts hands can hold at once, the one that moves included; `None` for any number. A plan ends before the
+    /// first step that needs more.
+    pub hands: Option<NonZeroU32>,
 }
 
 /// What it depends on how parts stand.
@@ -325,6 +338,10 @@ pub struct PlanRequest {
     pub assembly: Option<Staging>,
     /// What to report about each step.
     pub reports: Reports,
+    /// Put the steps into an order in which few parts have to be held at once.
+    pub steady: Option<Steady>,
+    /// What it depends on how parts stand: for `reports.stability` and `steady`.
+    pub gravity: Gravity,
 }
 
 impl PlanRequest {
@@ -337,6 +354,7 @@ impl PlanRequest {
             Some(Staging::Beside(staged)) => &staged[..],
             _ => &[],
         };
+        let gravity = (self.reports.stability || self.steady.is_some()).then_some(self.gravity);
         let mut writer = Writer::default();
         writer.value(PlanRequestHeader {
             handle: self.handle,
@@ -348,7 +366,8 @@ impl PlanRequest {
                 | flag(self.trace, PLAN_TRACE)
                 | flag(self.clearance.is_some(), PLAN_HAS_CLEARANCE)
                 | flag(self.up.is_some(), PLAN_HAS_UP)
-                | flag(self.reports.stability.is_some(), PLAN_REPORT_STABILITY)
+                | flag(self.steady.is_some(), PLAN_STEADY)
+                | flag(self.reports.stability, PLAN_REPORT_STABILITY)
                 | flag(self.reports.clearance, PLAN_REPORT_CLEARANCE)
                 | flag(self.reports.tools, PLAN_REPORT_TOOLS)
                 | flag(self.targets.is_some(), PLAN_HAS_TARGETS)
@@ -366,7 +385,7 @@ impl PlanRequest {
             penalty: self.penalty.len() as u32,
             groups: self.groups.len() as u32,
             keep: self.keep.len() as u32,
-            reserved: 0,
+            hands: self.steady.and_then(|steady| steady.hands).map_or(0, NonZeroU32::get),
             deadline_ns: self.deadline_ns.unwrap_or(0),
             max_simulations: self.max_simulations.unwrap_or(u64::MAX),
             path_timeout_ns: self.path_timeout_ns.unwrap_or(u64::MAX),
@@ -374,8 +393,8 @@ impl PlanRequest {
             seed: self.seed,
             clearance: self.clearance.unwrap_or(0.0),
             up: self.up.unwrap_or_default(),
-            friction: self.reports.stability.map_or(0.0, |gravity| gravity.friction),
-            against_gravity: self.reports.stability.map_or([0.0; 3], |gravity| gravity.up),
+            friction: gravity.map_or(0.0, |gravity| gravity.friction),
+            against_gravity: gravity.map_or([0.0; 3], |gravity| gravity.up),
         });
         let sizes: Vec<u32> = self.groups.iter().map(|group| group.len() as u32).collect();
         writer.array(&self.fixed).array(&self.removed).array(targets).array(&self.base).array(&self.keep);
@@ -420,11 +439,15 @@ impl PlanRequest {
             | PLAN_HAS_UP
             | PLAN_REPORT_STABILITY
             | PLAN_REPORT_CLEARANCE
-            | PLAN_REPORT_TOOLS;
+            | PLAN_REPORT_TOOLS
+            | PLAN_STEADY;
         let limit = |value: u64| (value != u64::MAX).then_some(value);
         let set = |bit: u32| h.flags & bit != 0;
         let astray = (set(PLAN_NO_STAGING) || !staged.is_empty()) && !set(PLAN_ASSEMBLY);
         let both = set(PLAN_NO_STAGING) && !staged.is_empty();
+        if h.hands != 0 && !set(PLAN_STEADY) {
+            return Err(Malformed::OutOfRange { field: "hands", value: u64::from(h.hands) });
+        }
         if set(!KNOWN) || (set(PLAN_SWEEPS) && set(PLAN_NO_SWEEPS)) || astray || both {
             return Err(Malformed::OutOfRange { field: "flags", value: u64::from(h.flags) });
         }
@@ -459,9 +482,14 @@ impl PlanRequest {
             } else {
                 Staging::Beside(staged)
             }),
+            steady: set(PLAN_STEADY).then_some(Steady { hands: NonZeroU32::new(h.hands) }),
+            gravity: if set(PLAN_REPORT_STABILITY) || set(PLAN_STEADY) {
+                Gravity { up: h.against_gravity, friction: h.friction }
+            } else {
+                Gravity::default()
+            },
             reports: Reports {
-                stability: set(PLAN_REPORT_STABILITY)
-                    .then_some(Gravity { up: h.against_gravity, friction: h.friction }),
+                stability: set(PLAN_REPORT_STABILITY),
                 clearance: set(PLAN_REPORT_CLEARANCE),
                 tools: set(PLAN_REPORT_TOOLS),
             },

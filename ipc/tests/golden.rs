@@ -1,6 +1,8 @@
 //! The bytes of every message of the protocol, written down once. A change to one of them breaks clients that
 //! are out there: a new layout needs a new version in the service names.
 
+use std::num::NonZeroU32;
+
 use sbdp_ipc::PROTOCOL;
 use sbdp_ipc::bytes::AlignedBytes;
 use sbdp_ipc::error::{ErrorCode, WireError};
@@ -8,7 +10,8 @@ use sbdp_ipc::geometry::{Assembly, HandleResponse, Part, Vertices};
 use sbdp_ipc::headers::{RequestHeader, RequestKind, ResponseHeader, ResponseKind};
 use sbdp_ipc::layout;
 use sbdp_ipc::plan::{
-    Gravity, MovedPart, PenaltyRecord, PlanRequest, Reports, Staging, Step, StepEnd, StepsView, encode_steps,
+    Gravity, MovedPart, PenaltyRecord, PlanRequest, Reports, Staging, Steady, Step, StepEnd, StepsView,
+    encode_steps,
 };
 use sbdp_ipc::progress::{ProgressSample, STAGE_SEARCH, TRIED_TURNS};
 use sbdp_ipc::revision::Revision;
@@ -133,18 +136,16 @@ fn a_plan_request() {
         groups: vec![vec![1, 2], vec![9, 10, 11]],
         moved: vec![MovedPart { part: 7, reserved: 0, motion: POSE }],
         assembly: None,
-        reports: Reports {
-            stability: Some(Gravity { up: [0.0, 0.0, 2.0], friction: 0.25 }),
-            clearance: true,
-            tools: true,
-        },
+        reports: Reports { stability: true, clearance: true, tools: true },
+        steady: Some(Steady { hands: NonZeroU32::new(2) }),
+        gravity: Gravity { up: [0.0, 0.0, 2.0], friction: 0.25 },
     };
     check(
         "plan request",
         &request.encode(),
         "\
-         abababababababab*4 0100000001000000 01000000971f0000 0400000003000000 0100000002000000 \
-         0100000001000000 0000000001000000 0100000002000000 0200000000000000 0403020100000000 0900000000000000 0a00000000000000 \
+         abababababababab*4 0100000001000000 01000000973f0000 0400000003000000 0100000002000000 \
+         0100000001000000 0000000001000000 0100000002000000 0200000002000000 0403020100000000 0900000000000000 0a00000000000000 \
          0b00000000000000 0c00000000000000 000000000000f03f 0000000000000000 000000000000f0bf 000000000000e03f \
          000000000000d03f 0000000000000000*2 0000000000000040 \
          0100000002000000 0300000000000000 0400000000000000 0500000006000000 0800000000000000 090000000a000000 \

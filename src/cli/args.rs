@@ -1,5 +1,6 @@
 //! The command line as the user writes it.
 
+use std::num::NonZeroU32;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -31,7 +32,7 @@ pub(super) use poses::placed;
 pub(super) use standing::{ScheduleArguments, StandingArguments, StaticsArguments};
 pub(super) use through_daemon::{BenchChurn, BenchLatency, BenchRawPeer, BenchReplan, BenchRestart};
 pub(super) use tools::ToolsArguments;
-pub(super) use view::{GraphArguments, StepsArguments, ViewArguments};
+pub(super) use view::{GraphArguments, PrecedenceArguments, StepsArguments, ViewArguments};
 
 /// Plans how assemblies come apart.
 #[derive(Debug, Parser)]
@@ -70,6 +71,8 @@ pub(super) enum Command {
     Statics(StaticsArguments),
     /// Say when which arm carries out which step of a plan, and what it holds
     Schedule(ScheduleArguments),
+    /// Write which step of a plan comes before which: for Graphviz, as JSON, or for task planners (PDDL)
+    Precedence(PrecedenceArguments),
     /// Say how near the parts that a plan moves pass the others
     Clearance(ClearanceArguments),
     /// Say which wrench, socket or key turns the fasteners that a plan takes off, and how far it can swing
@@ -161,7 +164,14 @@ pub(super) struct PlanArguments {
     /// What to report about each step of the plan besides its path (repeatable, or separated by commas)
     #[arg(long, value_enum, value_name = "WHAT", value_delimiter = ',', help_heading = WHAT)]
     pub(super) report: Vec<ReportArgument>,
-    /// With `--report stability`: the coefficient of friction of all contacts. 0.2 is dry machined steel at the lower end,
+    /// Put the steps into an order in which fewer parts have to be held at once. They then come when the order is known
+    #[arg(long, help_heading = WHAT)]
+    pub(super) steady: bool,
+    /// The same; and end the plan before the first step for which more hands are needed than this, the one that moves the
+    /// part included
+    #[arg(long, value_name = "N", help_heading = WHAT)]
+    pub(super) hands: Option<NonZeroU32>,
+    /// With `--report stability`, `--steady` and `--hands`: the coefficient of friction of all contacts. 0.2 is dry machined steel at the lower end,
     /// 0.05 oiled steel, 0.5 rubber
     #[arg(long, value_name = "MU", default_value_t = FRICTION, value_parser = not_negative, allow_negative_numbers = true, help_heading = WHAT)]
     pub(super) friction: f64,

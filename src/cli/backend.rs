@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use sbdp_ipc::plan::Reports;
+use sbdp_ipc::plan::{Gravity, Reports};
 
 use super::error::CliError;
 use super::listener::Listener;
@@ -30,6 +30,8 @@ pub(super) struct CommandQuestion<'a> {
     pub(super) request: PlanRequest,
     /// What to report about the plan.
     pub(super) reports: Reports,
+    /// What it depends on how parts stand.
+    pub(super) gravity: Gravity,
     /// When the answer is due.
     pub(super) deadline: Option<Instant>,
     /// Ends the work early; knows the deadline too.
@@ -63,7 +65,7 @@ impl Embedded {
     ) -> Result<PlanDocument, ServiceError> {
         let started = Instant::now();
         let termination = &question.termination;
-        let reports = ReportQuery::new(&question.reports)?;
+        let reports = ReportQuery::new(&question.reports, &question.gravity)?;
         let admission = self.service.admit_until(question.assembly, termination)?;
         let admitted = started.elapsed();
         let revised = self.service.revise_until(admission.id, &question.revision, termination)?;

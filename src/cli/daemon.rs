@@ -218,6 +218,8 @@ fn options(question: &CommandQuestion<'_>, trace: bool) -> PlanOptions {
         moved: Vec::new(),
         assembly: request.assembly.as_ref().map(staging),
         reports: question.reports,
+        steady: request.steady.map(|steady| client::Steady { hands: steady.hands }),
+        gravity: question.gravity,
     }
 }
 

@@ -1,7 +1,7 @@
 //! The command line `sbdp`.
 //!
 //! `plan` asks the daemon if one runs, else a service in this process; `check` always works
-//! here; `view`, `graph`, `steps`, `statics`, `schedule`, `clearance` and `tools` show; `cache` looks after the store on disk; `bench` runs `plan` in processes of its own. Results go to stdout; progress, warnings about the way there and errors to stderr.
+//! here; `view`, `graph`, `steps`, `statics`, `schedule`, `precedence`, `clearance` and `tools` show; `cache` looks after the store on disk; `bench` runs `plan` in processes of its own. Results go to stdout; progress, warnings about the way there and errors to stderr.
 
 mod args;
 mod backend;
@@ -20,6 +20,7 @@ mod listener;
 mod manual;
 mod part_names;
 mod plan;
+mod precedence;
 mod progress;
 mod report;
 mod report_lines;
@@ -58,6 +59,7 @@ pub fn run() -> ExitCode {
         Command::Steps(arguments) => steps::run(&arguments),
         Command::Statics(arguments) => statics::run(&arguments),
         Command::Schedule(arguments) => schedule::run(&arguments),
+        Command::Precedence(arguments) => precedence::run(&arguments),
         Command::Clearance(arguments) => clearance::run(&arguments),
         Command::Tools(arguments) => tools::run(&arguments),
         Command::Status(arguments) => status::run(&arguments),

@@ -23,7 +23,7 @@ use crate::document::{PlanDocument, SourceDocument};
 use crate::document::{absolute, content_of, source, with_files};
 use crate::files::{LoadOptions, customary_up, load};
 use crate::geometry::{Revision, SourceAssembly, content_hash, pose_from_waypoint};
-use crate::search::{PlanRequest, Planner, Termination};
+use crate::search::{PlanRequest, Planner, SteadyOrder, Termination};
 use crate::simulation::PenaltyParameters;
 
 pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode, CliError> {
@@ -60,7 +60,8 @@ pub(super) fn planned(arguments: &PlanArguments) -> Result<Planned, CliError> {
     let revision = revision(arguments, &assembly, &further(&options))?;
     let revised = assembly.revised(&revision);
     let request = request(arguments, &revised)?;
-    let reports = reports(arguments, &revised);
+    let reports = reports(arguments);
+    let gravity = gravity(arguments, &revised);
     interrupt::cancel_on_interrupt(&termination.cancel_flag())?;
     reading.store(false, Ordering::Relaxed);
     let backend = choose_backend(arguments, &termination)?;
@@ -71,6 +72,7 @@ pub(super) fn planned(arguments: &PlanArguments) -> Result<Planned, CliError> {
         read,
         request,
         reports,
+        gravity,
         deadline,
         termination,
     };
@@ -124,17 +126,27 @@ fn request(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<PlanR
         keep: resolve(assembly, "--keep", keep)?,
         groups: preferred_groups(arguments, assembly)?,
         targets: (!arguments.target.is_empty()).then_some(targets),
+        steady: steady(arguments, assembly),
         assembly: arguments.together.then(|| staging(assembly, &arguments.staging)).transpose()?,
         no_cache: arguments.no_cache,
     })
 }
 
-fn reports(arguments: &PlanArguments, assembly: &SourceAssembly) -> Reports {
-    let has = |what| arguments.report.contains(&what);
+fn steady(arguments: &PlanArguments, assembly: &SourceAssembly) -> Option<SteadyOrder> {
+    let Gravity { up, friction } = gravity(arguments, assembly);
+    let is_wanted = arguments.steady || arguments.hands.is_some();
+    is_wanted.then_some(SteadyOrder { up, friction, hands: arguments.hands })
+}
+
+fn gravity(arguments: &PlanArguments, assembly: &SourceAssembly) -> Gravity {
     let up = arguments.up.unwrap_or_else(|| customary_up(assembly));
-    let gravity = Gravity { up, friction: arguments.friction };
+    Gravity { up, friction: arguments.friction }
+}
+
+fn reports(arguments: &PlanArguments) -> Reports {
+    let has = |what| arguments.report.contains(&what);
     Reports {
-        stability: has(ReportArgument::Stability).then_some(gravity),
+        stability: has(ReportArgument::Stability),
         clearance: has(ReportArgument::Clearance),
         tools: has(ReportArgument::Tools),
     }

@@ -1,5 +1,6 @@
 //! `sbdp schedule`: when which arm carries out which step of a plan.
 
+use std::ops::Range;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -9,17 +10,21 @@ use serde::Serialize;
 use super::args::ScheduleArguments;
 use super::error::CliError;
 use super::standing::{StandingPlan, check_order_is_free};
-use super::table::TextTable;
+use super::table::{TextTable, listed};
 use super::{interrupt, show};
-use crate::document::{PlanDocument, StepDocument};
+use crate::document::{PlanDocument, StepDocument, kind_of};
 use crate::files::metres;
 use crate::geometry::{Assembly, Bounds, Pose, interpolate, pose_from_waypoint, transformed};
-use crate::schedule::{Held, MotionTimes, Operation, Schedule, ScheduleError, schedule};
+use crate::plan::PlanKind;
+use crate::schedule::{Held, MotionTimes, Operation, Schedule, ScheduleError, schedule, stations};
 use crate::search::Termination;
 use crate::service::StandingSession;
+use crate::statics::Stability;
 
 /// The version of the document.
 const SCHEMA: &str = "sbdp-schedule/1";
+/// The same with `--stations`.
+const LINE_SCHEMA: &str = "sbdp-line/1";
 
 /// What `--json` writes. Times are in seconds, steps are numbered as in the plan, from 0.
 #[derive(Debug, Serialize)]
@@ -32,6 +37,27 @@ struct ScheduleDocument<'a> {
     work: f64,
     critical: &'a [usize],
     steps: Vec<ScheduledDocument<'a>>,
+}
+
+/// What `--json` writes with `--stations`.
+#[derive(Debug, Serialize)]
+struct LineDocument<'a> {
+    schema: &'static str,
+    times: MotionTimes,
+    /// Of the slowest station.
+    cycle: f64,
+    /// Of all steps, one after the other.
+    work: f64,
+    stations: Vec<StationDocument<'a>>,
+}
+
+#[derive(Debug, Serialize)]
+struct StationDocument<'a> {
+    steps: Vec<usize>,
+    parts: Vec<&'a [String]>,
+    seconds: f64,
+    /// To move parts and to hold others; null with `--weightless`.
+    hands: Option<usize>,
 }
 
 #[derive(Debug, Serialize)]
@@ -47,11 +73,23 @@ struct ScheduledDocument<'a> {
 pub(super) fn run(arguments: &ScheduleArguments) -> Result<ExitCode, CliError> {
     let times = times(arguments.times.as_deref())?;
     let StandingPlan { plan, service, id, query, .. } = StandingPlan::read(&arguments.standing, false)?;
-    check_order_is_free(&plan, "schedule")?;
+    if arguments.stations.is_none() {
+        check_order_is_free(&plan, "schedule")?;
+    }
     let termination = Termination::default();
     interrupt::cancel_on_interrupt(&termination.cancel_flag())?;
     let interrupted = || CliError::Failed("interrupted".to_owned());
     let operations = operations(&plan, &service.assembly(id)?, &times);
+    if let Some(count) = arguments.stations {
+        let states = if arguments.weightless {
+            None
+        } else {
+            Some(service.statics(id, &query, &termination)?.ok_or_else(interrupted)?.states)
+        };
+        let document = line(&plan, &operations, count.get(), times, states.as_deref());
+        show(arguments.json.as_deref(), &document, "line", || line_table(&document))?;
+        return Ok(ExitCode::SUCCESS);
+    }
     let standing: Vec<usize> =
         query.states.first().into_iter().flat_map(|state| &state.parts).map(|(part, _)| *part).collect();
     let arms = arguments.arms.get();
@@ -77,7 +115,7 @@ pub(super) fn run(arguments: &ScheduleArguments) -> Result<ExitCode, CliError> {
             let parts = plan.steps.get(operation).map(|step| step.parts.join(", ")).unwrap_or_default();
             return Err(CliError::Refused(format!(
                 "--arms {arms} is too few: of all that could come next, step {} ({parts}) needs the fewest, {needed}: 1 to \
-                 move and {} to hold; `sbdp statics --reorder` may find an order that needs fewer",
+                 move and {} to hold; `sbdp plan --steady` may find an order that needs fewer",
                 operation + 1,
                 needed - 1
             )));
@@ -171,6 +209,60 @@ fn document<'a>(
         critical: &found.critical,
         steps: steps.collect(),
     }
+}
+
+/// The steps of a plan on a line of stations. `states` are those of the plan, the one before the first step included.
+fn line<'a>(
+    plan: &'a PlanDocument,
+    operations: &[Operation],
+    count: usize,
+    times: MotionTimes,
+    states: Option<&[Stability]>,
+) -> LineDocument<'a> {
+    let seconds: Vec<f64> = operations.iter().map(|operation| operation.seconds).collect();
+    // While a step moves its parts, what falls without them is held.
+    let held = |states: &[Stability], step: usize| match kind_of(plan) {
+        PlanKind::Disassembly => states[step + 1].trouble(),
+        PlanKind::Assembly => states[step].trouble(),
+    };
+    let station = |steps: Range<usize>| StationDocument {
+        parts: plan.steps[steps.clone()].iter().map(|step| &step.parts[..]).collect(),
+        seconds: seconds[steps.clone()].iter().sum(),
+        hands: states.map(|states| steps.clone().map(|step| 1 + held(states, step)).max().unwrap_or(0)),
+        steps: steps.collect(),
+    };
+    let stations: Vec<StationDocument<'a>> = stations(&seconds, count).into_iter().map(station).collect();
+    LineDocument {
+        schema: LINE_SCHEMA,
+        times,
+        cycle: stations.iter().map(|station| station.seconds).fold(0.0, f64::max),
+        work: seconds.iter().sum(),
+        stations,
+    }
+}
+
+fn line_table(document: &LineDocument<'_>) -> String {
+    let mut table = TextTable::new(&["station", "steps", "parts", "seconds", "hands"]);
+    for (number, station) in document.stations.iter().enumerate() {
+        let steps = match station.steps[..] {
+            [] => "–".to_owned(),
+            [only] => (only + 1).to_string(),
+            [first, .., last] => format!("{}–{}", first + 1, last + 1),
+        };
+        table.row([
+            (number + 1).to_string(),
+            steps,
+            listed(&station.parts.concat()),
+            format!("{:.1}", station.seconds),
+            station.hands.map_or_else(|| "–".to_owned(), |hands| hands.to_string()),
+        ]);
+    }
+    format!(
+        "{}\nA product leaves the line every {:.1} s; all steps one after the other take {:.1} s.\n",
+        table.render(),
+        document.cycle,
+        document.work
+    )
 }
 
 fn table(document: &ScheduleDocument<'_>, plan: &PlanDocument) -> String {

@@ -5,7 +5,7 @@ use nalgebra::{Unit, Vector3};
 use super::args::StandingArguments;
 use super::error::CliError;
 use super::subject::Subject;
-use crate::document::{PlanDocument, kind_of, reordered};
+use crate::document::{PlanDocument, kind_of};
 use crate::files::customary_up;
 use crate::plan::{PlanKind, StepEnd};
 use crate::report::{screwed_parts, standing_states, staying_parts};
@@ -38,13 +38,6 @@ impl StandingPlan {
         };
         let (service, id) = subject.admitted_with_parts_of_plan()?;
         Ok(Self { plan: subject.plan, stays, service, id, query })
-    }
-
-    /// Puts the steps into another order, in which each comes after those that it requires.
-    pub(super) fn reorder(&mut self, order: &[usize]) -> Result<(), CliError> {
-        self.plan = reordered(&self.plan, order);
-        self.query.states = standing_states(&self.plan, &self.stays).map_err(CliError::Refused)?;
-        Ok(())
     }
 }
 

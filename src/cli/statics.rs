@@ -7,14 +7,13 @@ use serde::Serialize;
 use super::args::StaticsArguments;
 use super::error::CliError;
 use super::report_lines::{fall, hands, hold};
-use super::standing::{StandingPlan, check_order_is_free};
+use super::standing::StandingPlan;
 use super::table::{TextTable, listed};
-use super::{interrupt, show, written};
-use crate::document::{PartNames, PlanDocument, StabilityDocument, StepDocument};
-use crate::geometry::pose_from_waypoint;
+use super::{interrupt, show};
+use crate::document::{PartNames, PlanDocument, StabilityDocument};
 use crate::report::stability_record;
 use crate::search::Termination;
-use crate::service::{JointKind, OrderedStep};
+use crate::service::JointKind;
 use crate::view::direction;
 
 /// The version of the document.
@@ -49,23 +48,10 @@ struct StateDocument<'a> {
 }
 
 pub(super) fn run(arguments: &StaticsArguments) -> Result<ExitCode, CliError> {
-    let mut asked = StandingPlan::read(&arguments.standing, arguments.margin)?;
+    let asked = StandingPlan::read(&arguments.standing, arguments.margin)?;
     let termination = Termination::default();
     interrupt::cancel_on_interrupt(&termination.cancel_flag())?;
     let interrupted = || CliError::Failed("interrupted".to_owned());
-    if let Some(file) = &arguments.reorder {
-        let steps = ordered_steps(&asked.plan)?;
-        let StandingPlan { service, id, query, .. } = &asked;
-        let order = service.steady_order(*id, query, &steps, &termination)?.ok_or_else(interrupted)?;
-        if order.len() < asked.plan.steps.len() {
-            let reason = "--reorder: steps of the plan require each other, or some that it does not have";
-            return Err(CliError::Refused(reason.to_owned()));
-        }
-        asked.reorder(&order)?;
-        let text = asked.plan.to_json();
-        let text = text.map_err(|e| CliError::Failed(format!("cannot write the plan as JSON: {e}")))?;
-        written(file, format!("{text}\n").as_bytes())?;
-    }
     let StandingPlan { plan, stays, service, id, query } = &asked;
     let answer = service.statics(*id, query, &termination)?.ok_or_else(interrupted)?;
     let name = |part: usize| plan.parts.get(part).map_or("?", String::as_str);
@@ -107,30 +93,6 @@ fn reason(kind: JointKind) -> &'static str {
         JointKind::Fastener => "fastener",
         JointKind::Thread => "thread",
     }
-}
-
-/// The steps as far as the order among them goes.
-fn ordered_steps(plan: &PlanDocument) -> Result<Vec<OrderedStep>, CliError> {
-    check_order_is_free(plan, "--reorder")?;
-    let number = |name: &String| plan.parts.iter().position(|part| part == name);
-    let ordered = |(i, step): (usize, &StepDocument)| {
-        let parts: Vec<usize> = step.parts.iter().filter_map(number).collect();
-        let requires = step.requires.iter().copied();
-        match (step.of, &parts[..]) {
-            // How a group lies matters to its own parts alone, which keep their order.
-            (Some(_), _) => {
-                let siblings = (0..i).filter(|&other| plan.steps[other].of == step.of);
-                OrderedStep { parts: Vec::new(), requires: requires.chain(siblings).collect(), end: None }
-            }
-            (None, [_]) => {
-                let end = step.path.last().map(pose_from_waypoint);
-                OrderedStep { requires: requires.collect(), end, parts }
-            }
-            // A group is out where it ends once all is gone that goes before it.
-            (None, _) => OrderedStep { requires: (0..i).collect(), end: None, parts },
-        }
-    };
-    Ok(plan.steps.iter().enumerate().map(ordered).collect())
 }
 
 fn table(plan: &PlanDocument, document: &StaticsDocument<'_>) -> String {

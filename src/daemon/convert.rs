@@ -16,7 +16,7 @@ use crate::geometry::{
     GeometryError, Pose, Revision, SourceAssembly, SourceMesh, SourcePart, pose_from_waypoint,
 };
 use crate::plan::{MotionKind, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, StepEnd};
-use crate::search::{ActionSet, Engine, PlanRequest, Planner, Progress, Stage, Staging, Tried};
+use crate::search::{ActionSet, Engine, PlanRequest, Planner, Progress, Stage, Staging, SteadyOrder, Tried};
 use crate::service::{AssemblyId, ServiceError};
 use crate::simulation::PenaltyParameters;
 use crate::termination::Interrupt;
@@ -47,6 +47,11 @@ pub(crate) fn plan_request(
         base: indices(&request.base),
         keep: indices(&request.keep),
         groups: request.groups.iter().map(|group| indices(group)).collect(),
+        steady: request.steady.map(|steady| SteadyOrder {
+            up: request.gravity.up,
+            friction: request.gravity.friction,
+            hands: steady.hands,
+        }),
         assembly: request.assembly.as_ref().map(staging),
         no_cache: request.no_cache,
     })

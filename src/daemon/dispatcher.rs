@@ -203,7 +203,7 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
             .map_err(|e| refuse(ErrorCode::Malformed, format!("plan request: {e}")))?;
         let request =
             convert::plan_request(&wire, self.limits.threads).map_err(|error| (Input::Refuse, error))?;
-        let reports = ReportQuery::new(&wire.reports)
+        let reports = ReportQuery::new(&wire.reports, &wire.gravity)
             .map_err(|error| (Input::Refuse, convert::service_error(&error)))?;
         let assembly = AssemblyId(wire.handle);
         let question = question(&wire);

@@ -48,6 +48,8 @@ impl Contingency {
         }
         // What does not move is kept anyway.
         request.keep.retain(|part| !request.fixed.contains(part));
+        // What the search finds is remembered for any order.
+        request.steady = None;
         request
     }
 }

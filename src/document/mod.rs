@@ -2,13 +2,11 @@
 //! is about, and where the parts stand while it is carried out.
 
 mod files;
-mod order;
 mod placements;
 
 use std::collections::BTreeMap;
 
 pub use files::{absolute, content_of, source, with_files};
-pub use order::reordered;
 pub(crate) use placements::MOTION_ROUNDING;
 pub use placements::{Placements, StepFrame, StepParts};
 pub use sbdp_ipc::document::{

@@ -13,7 +13,7 @@ use sbdp_ipc::summary::report::Report;
 
 use crate::document::PlanDocument;
 use crate::plan::{Plan, Warning};
-use crate::service::{AssemblyId, ClearanceQuery, Service, ServiceError, StaticsQuery};
+use crate::service::{AssemblyId, ClearanceQuery, Service, ServiceError, StaticsQuery, check_gravity};
 use crate::statics::StaticsOptions;
 use crate::termination::Termination;
 
@@ -36,8 +36,8 @@ impl ReportQuery {
     ///
     /// # Errors
     /// The direction against gravity is none, or the friction is negative or not finite.
-    pub fn new(reports: &Reports) -> Result<Self, ServiceError> {
-        let stability = reports.stability.as_ref().map(statics_options).transpose()?;
+    pub fn new(reports: &Reports, gravity: &Gravity) -> Result<Self, ServiceError> {
+        let stability = reports.stability.then(|| statics_options(gravity)).transpose()?;
         Ok(Self { stability, clearance: reports.clearance, tools: reports.tools })
     }
 
@@ -49,12 +49,9 @@ impl ReportQuery {
 }
 
 fn statics_options(&Gravity { up, friction }: &Gravity) -> Result<StaticsOptions, ServiceError> {
-    if !(friction.is_finite() && friction >= 0.0) {
-        return Err(ServiceError::NoFriction { value: friction });
-    }
-    let no_direction = ServiceError::NoDirection { field: "gravity", value: up };
-    let up = Unit::try_new(Vector3::from(up), 0.0).filter(|up| up.iter().all(|x| x.is_finite()));
-    Ok(StaticsOptions { up: up.ok_or(no_direction)?, friction, ..StaticsOptions::default() })
+    check_gravity(up, friction)?;
+    let up = Unit::new_normalize(Vector3::from(up));
+    Ok(StaticsOptions { up, friction, ..StaticsOptions::default() })
 }
 
 /// The report about a plan of an assembly, complete or not. What of it cannot be made is left out, and the plan gets a

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::document::{Placements, PlanDocument, StepDocument, StepParts, kind_of};
 use crate::geometry::{Pose, pose_from_waypoint};
 use crate::plan::{PlanKind, StepEnd};
-use crate::service::{PassingStep, StandingState};
+use crate::service::{PassingStep, StandingState, is_screwed_off};
 
 /// The names of what stays whatever happens: the base and what is fixed, else what is never taken off.
 ///
@@ -21,17 +21,13 @@ pub fn staying_parts(plan: &PlanDocument) -> Result<Vec<String>, String> {
     Ok(stays)
 }
 
-/// The parts that a step turns by more than half a turn: threads, as far as their contacts show one.
+/// The parts that the steps screw off.
 #[must_use]
 pub fn screwed_parts(plan: &PlanDocument) -> BTreeSet<usize> {
-    let turned = |step: &&StepDocument| {
-        let turns = step.path.windows(2).map(|pair| {
-            let [from, to] = [&pair[0], &pair[1]].map(pose_from_waypoint);
-            from.rotation.angle_to(&to.rotation)
-        });
-        turns.sum::<f64>() > std::f64::consts::PI
+    let is_screwed = |step: &&StepDocument| {
+        is_screwed_off(&step.path.iter().map(pose_from_waypoint).collect::<Vec<Pose>>())
     };
-    let steps = plan.steps.iter().filter(turned);
+    let steps = plan.steps.iter().filter(is_screwed);
     let number = |name: &String| plan.parts.iter().position(|part| part == name);
     steps.flat_map(|step| &step.parts).filter_map(number).collect()
 }

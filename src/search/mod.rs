@@ -79,7 +79,9 @@ pub use outcome::{BlockedAction, Counters, Inseparable, Outcome, Reason, Removal
 pub use preferred::PreferredGroups;
 pub use problem::{Checked, Effort, Observer, Problem, VerifiedPath};
 pub use release::Release;
-pub use request::{ActionSet, Engine, PlanRequest, PlanSink, Planner, Progress, Stage, Staging, Tried};
+pub use request::{
+    ActionSet, Engine, PlanRequest, PlanSink, Planner, Progress, Stage, Staging, SteadyOrder, Tried,
+};
 pub use state::least_travel;
 pub use trace::{BlockedBy, PlanningPhase, TraceEvent};
 

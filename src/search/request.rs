@@ -1,5 +1,6 @@
 //! A planning request, independent of any transport.
 
+use std::num::NonZeroU32;
 use std::time::Duration;
 
 use crate::blocking_graph::StaticAnalysis;
@@ -119,6 +120,18 @@ pub enum Staging {
     Beside(Vec<(usize, Waypoint)>),
 }
 
+/// An order of the steps in which few parts have to be held at once.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SteadyOrder {
+    /// The direction against gravity, in the input's frame, of any length but 0.
+    pub up: [f64; 3],
+    /// The coefficient of friction of all contacts, at least 0.
+    pub friction: f64,
+    /// How many parts hands can hold at once, the one that moves included; `None` for any number. A plan ends before the
+    /// first step that needs more.
+    pub hands: Option<NonZeroU32>,
+}
+
 /// A planning request about one assembly. Part numbers are indices into its parts.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PlanRequest {
@@ -168,6 +181,8 @@ pub struct PlanRequest {
     /// Groups that should leave as wholes, to be taken apart afterwards. A part may be in several groups if these are
     /// nested. Only SBDP* with the extended actions supports them.
     pub groups: Vec<Vec<usize>>,
+    /// Set for an order of the steps in which few parts have to be held at once.
+    pub steady: Option<SteadyOrder>,
     /// Set for an assembly plan (the disassembly reversed): where its parts begin.
     pub assembly: Option<Staging>,
     /// Whether the cache is neither read nor written.

@@ -13,8 +13,8 @@ use crate::geometry::{Assembly, Shape};
 use crate::plan::{Base, OVERLAP, Plan, PlanStatus, VERDICT, Verifier};
 use crate::scene::{HullTree, JoinedHulls};
 use crate::search::{
-    Effort, Engine, Observer, PlanRequest, PlanSink, PreferredGroups, Problem, Release, TraceEvent,
-    initial_graphs, search,
+    Effort, Engine, Observer, PlanRequest, PlanSink, PreferredGroups, Problem, Release, SteadyOrder,
+    TraceEvent, initial_graphs, search,
 };
 use crate::simulation::{
     MOTION, PenaltyEngine, PenaltyParameters, SlidingEngine, TOUCHING, TransitionFunction,
@@ -29,6 +29,7 @@ use super::prepared::{self, Prepared};
 use super::records::{PlanAnswer, PlanQuestion, remember_plan, remembered_plan};
 use super::relay::{Discard, Relay, WithoutSteps};
 use super::shared_shape::SharedShape;
+use super::steady::Standing;
 
 /// Refuses what is no length.
 pub(super) fn check_length(field: &'static str, length: Option<f64>) -> Result<(), ServiceError> {
@@ -36,15 +37,29 @@ pub(super) fn check_length(field: &'static str, length: Option<f64>) -> Result<(
     wrong.map_or(Ok(()), |value| Err(ServiceError::NoLength { field, value }))
 }
 
+fn check_direction(field: &'static str, value: [f64; 3]) -> Result<(), ServiceError> {
+    let length = Vector3::from(value).norm();
+    let is_direction = length.is_finite() && length > 0.0;
+    if is_direction { Ok(()) } else { Err(ServiceError::NoDirection { field, value }) }
+}
+
+/// Refuses a direction against gravity that is none, and a coefficient of friction that is negative or not finite.
+///
+/// # Errors
+/// The value that is refused.
+pub fn check_gravity(up: [f64; 3], friction: f64) -> Result<(), ServiceError> {
+    if !(friction.is_finite() && friction >= 0.0) {
+        return Err(ServiceError::NoFriction { value: friction });
+    }
+    check_direction("gravity", up)
+}
+
 /// Refuses values of a request that are none.
 fn check_values(request: &PlanRequest) -> Result<(), ServiceError> {
     check_length("clearance", request.clearance)?;
-    let is_direction = |up: &[f64; 3]| {
-        let length = Vector3::from(*up).norm();
-        length.is_finite() && length > 0.0
-    };
-    if let Some(value) = request.up.filter(|up| !is_direction(up)) {
-        return Err(ServiceError::NoDirection { field: "up", value });
+    request.up.map_or(Ok(()), |up| check_direction("up", up))?;
+    if let Some(SteadyOrder { up, friction, .. }) = request.steady {
+        check_gravity(up, friction)?;
     }
     if !request.groups.is_empty() && !request.prefers_groups() {
         let (planner, actions) = (request.planner.name(), request.actions.name());
@@ -136,7 +151,7 @@ impl Entry {
         // A trace shows what the search does, so the search must run.
         let known = if sink.traces() { None } else { remembered_plan(cache, &question) };
         let known = match known {
-            Some(answered) if request.assembly.is_none() => {
+            Some(answered) if request.assembly.is_none() && request.steady.is_none() => {
                 let (frame, answer) = self.remembered(frame, answered, sink, started);
                 return Ok(frame.plan(answer));
             }
@@ -171,15 +186,34 @@ impl Entry {
             return ended_before(frame, interrupt, "fields were built");
         }
         let ready = SearchInput { prepared: &prepared, hit, fields: started.elapsed(), cache, question };
-        let Some(staging) = &question.request.assembly else {
+        let PlanRequest { assembly: staging, steady, .. } = question.request;
+        if staging.is_none() && steady.is_none() {
             let (frame, answer) = self.searched(frame, &ready, time, sink);
             return frame.plan(answer);
-        };
-        // The steps of the disassembly are not those of the assembly plan.
+        }
+        // Steps in the order of the search are not those of the plan.
         let without_steps = &mut WithoutSteps { sink: &mut *sink };
-        let (frame, answer) = match known {
+        let (mut frame, mut answer) = match known {
             Some(known) => self.remembered(frame, known, without_steps, time.started),
             None => self.searched(frame, &ready, time, without_steps),
+        };
+        if let Some(wanted) = steady {
+            let is_there = |part: &usize| frame.removed.binary_search(part).is_err();
+            let present: Vec<usize> = (0..self.assembly.parts.len()).filter(is_there).collect();
+            let around = Standing {
+                assembly: &self.assembly,
+                scene: &prepared.scene,
+                present: &present,
+                fixed: &frame.fixed,
+            };
+            frame.notes.extend(around.in_steady_order(wanted, &mut answer.outcome, time.termination));
+            answer.times.total = time.started.elapsed();
+        }
+        let Some(staging) = staging else {
+            for removal in &answer.outcome.removals {
+                sink.step(&answer::removal(&self.assembly, removal));
+            }
+            return frame.plan(answer);
         };
         let removals = answer.outcome.removals.clone();
         let plan = frame.plan(answer);

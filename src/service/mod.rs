@@ -17,6 +17,7 @@ mod records;
 mod relay;
 mod shared_shape;
 mod statics;
+mod steady;
 mod store;
 #[cfg(test)]
 mod tests;
@@ -41,12 +42,13 @@ use crate::simulation::{Action, Axis, PenaltyParameters};
 use crate::termination::{Interrupt, Termination};
 
 pub use clearance::{ClearanceQuery, PartClearance, PassingStep, StepClearance};
+pub use entry::check_gravity;
 use entry::{Entry, check_length, engine_of};
 use pools::Pools;
 pub use records::RECORD_KINDS;
 pub(crate) use records::{AnsweredQuestion, recent_answers, remember_answer, remembered_answer};
 use relay::Discard;
-pub use statics::{JointKind, OrderedStep, StandingSession, StandingState, StaticsAnswer, StaticsQuery};
+pub use statics::{JointKind, StandingSession, StandingState, StaticsAnswer, StaticsQuery, is_screwed_off};
 use store::AssemblyStore;
 pub use store::StoreStatistics;
 pub use tools::FastenerTools;
@@ -445,24 +447,6 @@ impl Service {
     ) -> Result<Option<StaticsAnswer>, ServiceError> {
         self.with_scene(id, query, termination, |assembly, scene| {
             statics::answer(assembly, scene, query, termination)
-        })
-    }
-
-    /// An order of the steps of a disassembly in which few parts have to be held at once, as numbers of the steps: by the
-    /// first state of a query, from which the steps lead on, and in which no part is moved aside. Steps that require each
-    /// other, or what is not there, are left out.
-    ///
-    /// # Errors
-    /// As of [`Self::statics`].
-    pub fn steady_order(
-        &self,
-        id: AssemblyId,
-        query: &StaticsQuery,
-        steps: &[OrderedStep],
-        termination: &Termination,
-    ) -> Result<Option<Vec<usize>>, ServiceError> {
-        self.with_scene(id, query, termination, |assembly, scene| {
-            statics::steady_order(assembly, scene, query, steps, termination)
         })
     }
 

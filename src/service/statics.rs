@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::fasteners::Fastener;
 use crate::geometry::{Assembly, Pose, scaled_pose};
-use crate::scene::{Scene, StandingParts, exit_direction};
+use crate::scene::Scene;
 use crate::simulation::NullTwist;
 use crate::statics::{Stability, Statics, StaticsOptions};
 use crate::termination::{Interrupt, Termination};
@@ -37,18 +37,6 @@ pub struct StaticsQuery {
     pub apart: Vec<[usize; 2]>,
 }
 
-/// A step of a plan, as far as the order among the steps goes.
-#[derive(Debug, Clone, PartialEq)]
-pub struct OrderedStep {
-    /// The parts that it takes out of the assembly; none if it takes a group apart that is out.
-    pub parts: Vec<usize>,
-    /// The numbers of the steps that come before it.
-    pub requires: Vec<usize>,
-    /// Of a single part that has to end apart from the hull of all that stands, the motion (input frame) from its assembled
-    /// pose to where it ends.
-    pub end: Option<Pose>,
-}
-
 /// The answer to a [`StaticsQuery`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct StaticsAnswer {
@@ -69,6 +57,13 @@ pub enum JointKind {
     Fastener,
     /// The plan screws one of them off, and their contacts leave only a helix.
     Thread,
+}
+
+/// Whether a path turns its part by more than half a turn: off a thread, as far as contacts show one.
+#[must_use]
+pub fn is_screwed_off(path: &[Pose]) -> bool {
+    let turns = path.windows(2).map(|pair| pair[0].rotation.angle_to(&pair[1].rotation));
+    turns.sum::<f64>() > std::f64::consts::PI
 }
 
 /// States with the same parts aside.
@@ -155,62 +150,6 @@ impl<'a> StandingSession<'a> {
     pub fn stability(&mut self, standing: &[usize]) -> Result<Stability, Interrupt> {
         self.statics.stability(standing, self.stays, self.termination)
     }
-}
-
-/// An order of steps in which few parts have to be held at once: the first step that needs no more hands than the state
-/// before it, those first that take out what has to be held; where there is none, a step that needs the fewest.
-///
-/// A part has to end apart from the hull of all that stands then, which it does from its place in the plan on.
-pub(super) fn steady_order(
-    assembly: &Assembly,
-    scene: &Scene,
-    query: &StaticsQuery,
-    steps: &[OrderedStep],
-    termination: &Termination,
-) -> Result<Vec<usize>, Interrupt> {
-    let mut session = StandingSession::new(assembly, scene, query, termination)?;
-    let first = query.states.first().into_iter().flat_map(|state| &state.parts);
-    let mut standing: Vec<usize> = first.map(|(part, _)| *part).collect();
-    let mut state = session.stability(&standing)?;
-    let mut order = Vec::with_capacity(steps.len());
-    while order.len() < steps.len() {
-        let is_ready = |number: &usize| {
-            !order.contains(number) && steps[*number].requires.iter().all(|before| order.contains(before))
-        };
-        let mut ready: Vec<usize> = (0..steps.len()).filter(is_ready).collect();
-        let falling = state.falling();
-        ready.sort_by_key(|&number| !steps[number].parts.iter().any(|part| falling.contains(part)));
-        let mut best: Option<(usize, Vec<usize>, Stability)> = None;
-        for number in ready {
-            let OrderedStep { parts, end, .. } = &steps[number];
-            let rest: Vec<usize> = standing.iter().copied().filter(|part| !parts.contains(part)).collect();
-            if let (Some(end), &[part]) = (end, &parts[..])
-                && !is_out(scene, &rest, part, &scaled_pose(end, assembly.scale))
-            {
-                continue;
-            }
-            let found = session.stability(&rest)?;
-            let is_steady = found.trouble() <= state.trouble();
-            if best.as_ref().is_none_or(|(.., least)| found.trouble() < least.trouble()) {
-                best = Some((number, rest, found));
-            }
-            if is_steady {
-                break;
-            }
-        }
-        // What is left waits for each other.
-        let Some((number, rest, found)) = best else { break };
-        order.push(number);
-        (standing, state) = (rest, found);
-    }
-    Ok(order)
-}
-
-/// Whether the hull of a part, moved from its assembled pose (planning frame), is apart from that of what stands.
-fn is_out(scene: &Scene, standing: &[usize], part: usize, motion: &Pose) -> bool {
-    let pose = motion * scene.bodies[part].planning_from_shape;
-    standing.is_empty()
-        || exit_direction(scene, &StandingParts::new(scene, standing.to_vec()), part, &pose, None).is_some()
 }
 
 /// The fastener of each shape, if it is one.

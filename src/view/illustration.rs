@@ -40,6 +40,9 @@ const BACKGROUND: Rgb = [255, 255, 255];
 /// The moving parts: the vermilion of Okabe and Ito's palette, which no pale part comes near to.
 pub(super) const MOVING: Rgb = [0xE8, 0x5D, 0x04];
 const MOVING_EDGE: Rgb = [0x5A, 0x1E, 0x00];
+/// Parts that have to be held meanwhile.
+pub(super) const HELD: Rgb = [0xC2, 0x18, 0x3A];
+const HELD_EDGE: Rgb = [0x4A, 0x00, 0x12];
 const EDGE: Rgb = [0x56, 0x60, 0x70];
 /// The colours of stuck parts. They alternate, so that two parts that hold each other differ.
 pub(super) const STUCK: [Rgb; 3] = [[0x8E, 0x3B, 0x9C], [0xC9, 0x8A, 0xD6], [0x5F, 0x4B, 0xB6]];
@@ -153,6 +156,8 @@ enum Role {
     Moving,
     /// It is there.
     Standing,
+    /// It is there, and has to be held.
+    Held,
     /// It is shown in its own colour.
     Coloured,
     /// It should have moved, and did not; its turn among the colours.
@@ -192,8 +197,11 @@ impl Figure {
         let mut figure = Self::default();
         let is_moved =
             |part: &usize| instruction.steps.iter().any(|&step| scene.steps[step].parts.contains(part));
+        let is_held =
+            |part: usize| instruction.steps.iter().any(|&step| scene.steps[step].held.contains(&part));
         for &part in body.iter().filter(|part| !is_moved(part)) {
-            figure.shown.push(Shown { part, at: scene.parts[part].placement(begins), role: Role::Standing });
+            let role = if is_held(part) { Role::Held } else { Role::Standing };
+            figure.shown.push(Shown { part, at: scene.parts[part].placement(begins), role });
         }
         let standing = figure.shown.iter().map(|shown| scene.bounds_at(shown.part, &shown.at));
         let size = standing.fold(Bounds::EMPTY, |all, own| all.union(&own)).extents().norm();
@@ -250,7 +258,7 @@ impl Figure {
         let posed = |shown: &Shown| Posed {
             mesh: &scene.drawn[scene.parts[shown.part].drawn],
             at: shown.at,
-            is_subject: shown.role != Role::Standing,
+            is_subject: !matches!(shown.role, Role::Standing | Role::Held),
         };
         self.shown.iter().map(posed).collect()
     }
@@ -393,6 +401,7 @@ fn paint(scene: &PlanScene, shown: &Shown) -> Paint {
     let pale = |share: f64| own.map(|c| (f64::from(c) * (1.0 - share) + 255.0 * share).round() as u8);
     match shown.role {
         Role::Moving => Paint { colour: MOVING, edge: MOVING_EDGE, outline: 2 },
+        Role::Held => Paint { colour: HELD, edge: HELD_EDGE, outline: 2 },
         Role::Standing => Paint { colour: pale(0.78), edge: EDGE, outline: 1 },
         Role::Coloured => Paint { colour: pale(0.25), edge: EDGE, outline: 1 },
         Role::Stuck(turn) => Paint { colour: STUCK[turn], edge: STUCK_EDGE, outline: 2 },

@@ -11,7 +11,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
 
-use super::illustration::{FREE, MOVING, STUCK, shots};
+use super::illustration::{FREE, HELD, MOVING, STUCK, shots};
 use super::layout::layout;
 use super::{
     DrawnPart, Instructions, Keyframe, PALETTE, Placement, PlanScene, Rgb, SceneGroup, ScenePart, SceneStep,
@@ -76,6 +76,7 @@ struct Data<'a> {
 #[derive(Debug, Serialize)]
 struct Colours {
     moving: String,
+    held: String,
     stuck: Vec<String>,
     free: Vec<String>,
 }
@@ -140,6 +141,7 @@ struct PageStep<'a> {
     body: &'a [usize],
     words: &'a str,
     after: &'a [usize],
+    held: &'a [usize],
     begins: f64,
     ends: f64,
 }
@@ -185,6 +187,7 @@ fn data<'a>(
         palette: PALETTE.iter().map(css).collect(),
         colours: Colours {
             moving: css(&MOVING),
+            held: css(&HELD),
             stuck: STUCK.iter().map(css).collect(),
             free: FREE.iter().map(css).collect(),
         },
@@ -306,6 +309,7 @@ fn step(step: &SceneStep) -> PageStep<'_> {
         body: &step.body,
         words: &step.words,
         after: &step.after,
+        held: &step.held,
         begins: step.begins,
         ends: step.ends,
     }

@@ -6,7 +6,9 @@ use sbdp::hostile_input::{Reader, field_file};
 use sbdp_ipc::endpoint::Endpoint;
 use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::geometry::{Assembly, Part, Vertices};
-use sbdp_ipc::plan::{Gravity, MovedPart, PenaltyRecord, PlanRequest, Reports, Staging, Step, encode_steps};
+use sbdp_ipc::plan::{
+    Gravity, MovedPart, PenaltyRecord, PlanRequest, Reports, Staging, Steady, Step, encode_steps,
+};
 use sbdp_ipc::revision::Revision;
 use sbdp_ipc::status::{Status, StatusHeader};
 use sbdp_ipc::summary::report::{Clearance, Closest, Fastener, Report, Stability, Tool, Unstable};
@@ -193,7 +195,9 @@ fn messages() -> Vec<Vec<u8>> {
         targets: Some(vec![0]),
         moved: vec![MovedPart { part: 1, ..MovedPart::default() }],
         assembly: Some(Staging::Beside(vec![MovedPart::default()])),
-        reports: Reports { stability: Some(Gravity::default()), clearance: true, tools: true },
+        reports: Reports { stability: true, clearance: true, tools: true },
+        steady: Some(Steady { hands: std::num::NonZeroU32::new(2) }),
+        gravity: Gravity::default(),
         ..PlanRequest::default()
     };
     let status = Status {

@@ -186,6 +186,9 @@ struct PlanOptions {
     std::vector<SbdpPenalty> penalty;
     // The sum of some SBDP_REPORT_…: what to report about each step in the plan's JSON.
     std::uint32_t reports = 0;
+    // An order in which few parts have to be held at once; of at most so many hands, if that is not 0.
+    bool steady = false;
+    std::uint32_t hands = 0;
     std::optional<double> friction;
     std::optional<std::array<double, 3>> against_gravity;
 };
@@ -232,6 +235,8 @@ template <class F> auto with_options(const PlanOptions &o, F use) {
     c.staged = o.staged.data(), c.staged_count = o.staged.size();
     c.penalty = o.penalty.data(), c.penalty_count = o.penalty.size();
     c.reports = o.reports;
+    c.steady = o.steady || o.hands != 0;
+    c.hands = o.hands;
     c.friction = o.friction ? &*o.friction : nullptr;
     c.against_gravity = o.against_gravity ? o.against_gravity->data() : nullptr;
     return use(&c);

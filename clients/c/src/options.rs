@@ -1,10 +1,11 @@
 //! Options of a plan.
 
+use std::num::NonZeroU32;
 use std::time::Duration;
 
 use sbdp_client::{
     ActionSet, Engine, Gravity, PenaltyParameter, PlanOptions, Planner, Reports, Staging, StaticAnalysis,
-    Waypoint,
+    Steady, Waypoint,
 };
 
 use crate::border::Failure;
@@ -214,11 +215,16 @@ pub struct SbdpPlanOptions {
     pub keep_count: usize,
     /// What to report about each step besides its path: the sum of some `SbdpReport`s. `sbdp_plan_json` has the reports.
     pub reports: u32,
+    /// Not 0: put the steps into an order in which few parts have to be held at once. They then come when it is known.
+    pub steady: u32,
+    /// With `steady`: how many parts hands can hold at once, the one that moves included; 0 for any number. The plan ends
+    /// before the first step that needs more.
+    pub hands: u32,
     /// Zero.
-    pub reserved_reports: u32,
-    /// With `SBDP_REPORT_STABILITY`: the coefficient of friction of all contacts; null for 0.2.
+    pub reserved_hands: u32,
+    /// With `SBDP_REPORT_STABILITY` or `steady`: the coefficient of friction of all contacts; null for 0.2.
     pub friction: *const f64,
-    /// With `SBDP_REPORT_STABILITY`: the direction against gravity, three numbers, of any length but 0; null for `up`, and
+    /// With `SBDP_REPORT_STABILITY` or `steady`: the direction against gravity, three numbers, of any length but 0; null for `up`, and
     /// without that for +z.
     pub against_gravity: *const f64,
 }
@@ -279,7 +285,9 @@ pub(crate) unsafe fn read_plan_options(options: *const SbdpPlanOptions) -> Resul
                 given.staging,
                 &[None, Some(Staging::None), Some(Staging::Beside(staged))],
             )?,
-            reports: reports(&given)?,
+            reports: reports(given.reports)?,
+            steady: steady(&given)?,
+            gravity: gravity(&given)?,
             no_cache: given.no_cache != 0,
             batch: given.batch != 0,
             trace: given.trace != 0,
@@ -287,17 +295,31 @@ pub(crate) unsafe fn read_plan_options(options: *const SbdpPlanOptions) -> Resul
     }
 }
 
+fn reports(number: u32) -> Result<Reports, Failure> {
+    const KNOWN: u32 = SbdpReport::Stability as u32 | SbdpReport::Clearance as u32 | SbdpReport::Tools as u32;
+    if number & !KNOWN != 0 {
+        let problem =
+            format!("`options->reports` is {number}: this library does not know all of these reports");
+        return Err(Failure::argument(problem));
+    }
+    let has = |report: SbdpReport| number & report as u32 != 0;
+    Ok(Reports {
+        stability: has(SbdpReport::Stability),
+        clearance: has(SbdpReport::Clearance),
+        tools: has(SbdpReport::Tools),
+    })
+}
+
+fn steady(given: &SbdpPlanOptions) -> Result<Option<Steady>, Failure> {
+    if given.hands != 0 && given.steady == 0 {
+        return Err(Failure::argument("`options->hands` goes with `steady` alone"));
+    }
+    Ok((given.steady != 0).then_some(Steady { hands: NonZeroU32::new(given.hands) }))
+}
+
 /// # Safety
 /// The pointers of the options are null or valid.
-unsafe fn reports(given: &SbdpPlanOptions) -> Result<Reports, Failure> {
-    const KNOWN: u32 = SbdpReport::Stability as u32 | SbdpReport::Clearance as u32 | SbdpReport::Tools as u32;
-    if given.reports & !KNOWN != 0 {
-        return Err(Failure::argument(&format!(
-            "`options->reports` is {}: this library does not know all",
-            given.reports
-        )));
-    }
-    let has = |report: SbdpReport| given.reports & report as u32 != 0;
+unsafe fn gravity(given: &SbdpPlanOptions) -> Result<Gravity, Failure> {
     // SAFETY: so the caller promises.
     let (friction, against_gravity, up) = unsafe {
         (
@@ -307,14 +329,9 @@ unsafe fn reports(given: &SbdpPlanOptions) -> Result<Reports, Failure> {
         )
     };
     let usual = Gravity::default();
-    let gravity = Gravity {
+    Ok(Gravity {
         up: against_gravity.or(up).unwrap_or(usual.up),
         friction: friction.unwrap_or(usual.friction),
-    };
-    Ok(Reports {
-        stability: has(SbdpReport::Stability).then_some(gravity),
-        clearance: has(SbdpReport::Clearance),
-        tools: has(SbdpReport::Tools),
     })
 }
 

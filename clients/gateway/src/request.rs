@@ -1,10 +1,11 @@
 //! What a caller chooses for a plan.
 
+use std::num::NonZeroU32;
 use std::time::Duration;
 
 use sbdp_client::{
     ActionSet, Engine, Gravity, Handle, PenaltyParameter, PlanOptions, Planner, Reports, Staging,
-    StaticAnalysis, Waypoint,
+    StaticAnalysis, Steady, Waypoint,
 };
 use tonic::Status;
 
@@ -58,6 +59,8 @@ pub(crate) fn options(request: &proto::PlanRequest) -> Result<PlanOptions, Statu
         moved: moved("moved", &request.moved)?,
         assembly: staging(request)?,
         reports: reports(request)?,
+        steady: steady(request)?,
+        gravity: gravity(request),
         no_cache: request.no_cache,
         batch: request.batch,
         trace: request.trace,
@@ -70,16 +73,25 @@ fn reports(request: &proto::PlanRequest) -> Result<Reports, Status> {
     if !kinds.is_empty() && !request.document {
         return Err(argument("reports", "they are in the document: set `document`, too"));
     }
-    let usual = Gravity::default();
-    let gravity = Gravity {
-        up: request.up.map_or(usual.up, |up| [up.x, up.y, up.z]),
-        friction: request.friction.unwrap_or(usual.friction),
-    };
     Ok(Reports {
-        stability: kinds.contains(&proto::Report::Stability).then_some(gravity),
+        stability: kinds.contains(&proto::Report::Stability),
         clearance: kinds.contains(&proto::Report::Clearance),
         tools: kinds.contains(&proto::Report::Tools),
     })
+}
+
+fn steady(request: &proto::PlanRequest) -> Result<Option<Steady>, Status> {
+    let none = || argument("hands", "one is needed to move a part");
+    let hands = request.hands.map(|hands| NonZeroU32::new(hands).ok_or_else(none)).transpose()?;
+    Ok((request.steady || hands.is_some()).then_some(Steady { hands }))
+}
+
+fn gravity(request: &proto::PlanRequest) -> Gravity {
+    let usual = Gravity::default();
+    Gravity {
+        up: request.up.map_or(usual.up, |up| [up.x, up.y, up.z]),
+        friction: request.friction.unwrap_or(usual.friction),
+    }
 }
 
 fn planner(number: i32) -> Result<Planner, Status> {
@@ -161,6 +173,7 @@ mod tests {
             ("static_analysis", PlanRequest { static_analysis: i32::MAX, ..PlanRequest::default() }),
             ("reports", PlanRequest { reports: vec![4], document: true, ..PlanRequest::default() }),
             ("reports", PlanRequest { reports: vec![1], ..PlanRequest::default() }),
+            ("hands", PlanRequest { hands: Some(0), ..PlanRequest::default() }),
             ("staging", PlanRequest { staging: 3, ..PlanRequest::default() }),
             ("staged", PlanRequest { staged: vec![nowhere], ..PlanRequest::default() }),
             ("moved[0].motion", PlanRequest { moved: vec![nowhere], ..PlanRequest::default() }),

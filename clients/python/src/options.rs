@@ -1,5 +1,6 @@
 //! The options of a plan request, from keyword arguments.
 
+use std::num::NonZeroU32;
 use std::time::Duration;
 
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -7,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 use sbdp_client::{
     ActionSet, Engine, Gravity, PenaltyParameter, PlanOptions, Planner, Reports, Staging, StaticAnalysis,
-    Waypoint,
+    Steady, Waypoint,
 };
 
 use crate::assembly::Data;
@@ -133,6 +134,7 @@ pub(crate) fn options(
 ) -> PyResult<PlanOptions> {
     let mut options = PlanOptions::default();
     let (mut actions, mut together, mut staging) = (None, false, None);
+    let (mut steady, mut hands) = (false, None::<NonZeroU32>);
     let (mut reported, mut friction) = (Vec::new(), Gravity::default().friction);
     for (key, value) in keywords.into_iter().flatten() {
         let key: String = key.extract()?;
@@ -182,6 +184,8 @@ pub(crate) fn options(
             "up" => options.up = direction(&value)?,
             "report" => reported = report_kinds(&value)?,
             "friction" => friction = value.extract()?,
+            "steady" => steady = value.extract()?,
+            "hands" => hands = value.extract()?,
             "groups" => {
                 if one_of(&key, &value, &[("needed", false), ("prefer", true)])? {
                     options.groups = groups(py, data)?;
@@ -214,8 +218,10 @@ pub(crate) fn options(
     let up = options.up.unwrap_or_else(|| {
         data.files().map_or([0.0, 0.0, 1.0], |(assembly, _)| sbdp::files::customary_up(assembly))
     });
+    options.gravity = Gravity { up, friction };
+    options.steady = (steady || hands.is_some()).then_some(Steady { hands });
     options.reports = Reports {
-        stability: reported.contains(&ReportKind::Stability).then_some(Gravity { up, friction }),
+        stability: reported.contains(&ReportKind::Stability),
         clearance: reported.contains(&ReportKind::Clearance),
         tools: reported.contains(&ReportKind::Tools),
     };

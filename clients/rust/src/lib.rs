@@ -91,7 +91,7 @@ pub use plan::Plan;
 pub use sbdp_ipc::document::PlanDocument;
 pub use sbdp_ipc::error::ErrorCode;
 pub use sbdp_ipc::geometry::{Assembly, Part, Vertices};
-pub use sbdp_ipc::plan::{Gravity, Reports, StepEnd, StepView, Waypoint};
+pub use sbdp_ipc::plan::{Gravity, Reports, Steady, StepEnd, StepView, Waypoint};
 pub use sbdp_ipc::status::Status;
 pub use sbdp_ipc::summary::Stats;
 pub use sbdp_ipc::summary::report::{self, Report};

@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use sbdp_ipc::clock;
-use sbdp_ipc::plan::{self, MovedPart, PENALTY_PARAMETERS, PenaltyRecord, PlanRequest, Reports, Waypoint};
+use sbdp_ipc::plan::{
+    self, Gravity, MovedPart, PENALTY_PARAMETERS, PenaltyRecord, PlanRequest, Reports, Steady, Waypoint,
+};
 use sbdp_ipc::polling;
 
 use crate::interrupt::Interrupt;
@@ -245,6 +247,10 @@ pub struct PlanOptions {
     pub assembly: Option<Staging>,
     /// What to report about each step besides its path: [`Summary::report`](crate::Summary::report).
     pub reports: Reports,
+    /// Put the steps into an order in which few parts have to be held at once. They then come when the order is known.
+    pub steady: Option<Steady>,
+    /// What it depends on how parts stand: for `reports.stability` and `steady`.
+    pub gravity: Gravity,
     /// Neither read nor write the cache.
     pub no_cache: bool,
     /// Other requests come first: no one waits for this plan.
@@ -283,6 +289,8 @@ impl PlanOptions {
             groups: self.groups.clone(),
             moved: self.moved.iter().map(moved_part).collect(),
             reports: self.reports,
+            steady: self.steady,
+            gravity: self.gravity,
             assembly: self.assembly.as_ref().map(|staging| match staging {
                 Staging::None => plan::Staging::None,
                 Staging::Beside(given) => plan::Staging::Beside(given.iter().map(moved_part).collect()),

@@ -79,6 +79,7 @@ fn groups() -> Vec<Group> {
                 plan::PLAN_REPORT_STABILITY,
                 plan::PLAN_REPORT_CLEARANCE,
                 plan::PLAN_REPORT_TOOLS,
+                plan::PLAN_STEADY,
             ],
         ),
         (

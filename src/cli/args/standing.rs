@@ -47,10 +47,6 @@ pub(in crate::cli) struct StaticsArguments {
     /// Also find out how much of the weight may act sideways until something falls; it takes many times as long
     #[arg(long)]
     pub(in crate::cli) margin: bool,
-    /// Put the steps into an order in which fewer parts have to be held at once, and write that plan to this file. Only for
-    /// disassemblies in which no part is moved aside
-    #[arg(long, value_name = "FILE")]
-    pub(in crate::cli) reorder: Option<PathBuf>,
     /// Write the states as JSON to this file (`-`: to stdout, instead of the table)
     #[arg(long, value_name = "FILE")]
     pub(in crate::cli) json: Option<PathBuf>,
@@ -64,6 +60,10 @@ pub(in crate::cli) struct ScheduleArguments {
     /// Number of arms (workers' hands, robots), each of which moves one part or group, or holds one part
     #[arg(long, value_name = "N", default_value = "2")]
     pub(in crate::cli) arms: NonZero<usize>,
+    /// Instead, divide the steps in the plan's order among this many stations of a line, so that the slowest is as fast as
+    /// possible
+    #[arg(long, value_name = "N", conflicts_with = "arms")]
+    pub(in crate::cli) stations: Option<NonZero<usize>>,
     /// Do without regard to what falls: no arm has to hold
     #[arg(long)]
     pub(in crate::cli) weightless: bool,

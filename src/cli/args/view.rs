@@ -45,6 +45,17 @@ pub(in crate::cli) struct GraphArguments {
     pub(in crate::cli) output: PathBuf,
 }
 
+/// Arguments of `sbdp precedence`.
+#[derive(Debug, Args)]
+pub(in crate::cli) struct PrecedenceArguments {
+    /// A plan that `sbdp plan --json` wrote
+    pub(in crate::cli) plan: PathBuf,
+    /// Where it goes: .dot for Graphviz; .json; .pddl for the problem of a task planner, whose domain goes beside it
+    /// (`order.pddl`: `order-domain.pddl`)
+    #[arg(short, long, value_name = "FILE")]
+    pub(in crate::cli) output: PathBuf,
+}
+
 /// Arguments of `sbdp steps`.
 #[derive(Debug, Args)]
 pub(in crate::cli) struct StepsArguments {

@@ -124,6 +124,8 @@ pub struct SceneStep {
     pub body: Vec<usize>,
     /// Other parts that must have moved before.
     pub after: Vec<usize>,
+    /// Other parts that have to be held, if the plan says so.
+    pub held: Vec<usize>,
     /// The step in words.
     pub words: String,
 }

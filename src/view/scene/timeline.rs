@@ -3,11 +3,11 @@
 use nalgebra::Point3;
 
 use super::super::explode::Leaving;
+use super::super::handling::held;
 use super::super::words::{Words, required};
 use super::builder::SceneBuilder;
 use super::{Keyframe, ScenePart, SceneStep};
-use crate::document::kind_of;
-use crate::document::{Placements, StepFrame};
+use crate::document::{Placements, StabilityDocument, StepFrame, kind_of};
 use crate::geometry::{Bounds, Pose, interpolate, pose_from_waypoint};
 use crate::plan::{PlanKind, StepEnd};
 
@@ -61,6 +61,8 @@ impl SceneBuilder<'_> {
                 leaving.push(Leaving { number, of: step.of, parts: moving.clone(), centres });
             }
             let after = required(self.plan, number).into_iter().filter_map(|name| self.place(name));
+            let states: Vec<&StabilityDocument> = step.stability.iter().collect();
+            let held = held(self.plan, &states).into_iter().filter_map(|name| self.place(name));
             steps.push(SceneStep {
                 parts: moving,
                 of: step.of,
@@ -69,6 +71,7 @@ impl SceneBuilder<'_> {
                 is_aside: frame.ends == StepEnd::Aside,
                 body: Vec::new(),
                 after: after.collect(),
+                held: held.collect(),
                 words: words.step(number),
             });
             clock = course.ends + PAUSE;

@@ -54,8 +54,12 @@ class Options(TypedDict, total=False):
     report: Report | Iterable[Report]
     """What to report about each step besides its path: `stability`, `clearance` and `tools` of `steps` in `Plan.to_dict()`.
     Gravity acts against `up`; without it, against +z (+y of glTF scenes)."""
+    steady: bool
+    """Put the steps into an order in which few parts have to be held at once. They then come when the order is known."""
+    hands: int | None
+    """As `steady`; the plan ends before the first step for which more hands are needed, the one that moves included."""
     friction: float
-    """With the report "stability": the coefficient of friction of all contacts, 0.2 by default."""
+    """With the report "stability", `steady` and `hands`: the coefficient of friction of all contacts, 0.2 by default."""
     groups: Literal["needed", "prefer"]
     """"prefer": groups that the files name leave as wholes, as long as anything else leaves."""
     no_cache: bool

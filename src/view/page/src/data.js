@@ -36,6 +36,7 @@
  * @property {number[]} body the parts of the body that they leave, or get into, as long as they are in it
  * @property {string} words
  * @property {number[]} after other parts that must have moved before
+ * @property {number[]} held other parts that have to be held, if the plan says so
  * @property {number} begins
  * @property {number} ends
  *
@@ -68,7 +69,7 @@
  * @property {string | null} verdict why it is not complete
  * @property {number} duration seconds
  * @property {string[]} palette
- * @property {{moving: string, stuck: string[], free: string[]}} colours with a meaning
+ * @property {{moving: string, held: string, stuck: string[], free: string[]}} colours with a meaning
  * @property {Instruction[]} instructions
  * @property {Mesh[]} meshes
  * @property {Part[]} parts

@@ -361,11 +361,13 @@ export class Stage {
     else if (!pointing(selection) && instruction?.hiding.includes(part)) opacity *= THROUGH;
     look.fade(opacity);
     const moving = this.active.some((step) => scene.steps[step].parts.includes(part));
-    look.outline(moving || picked);
+    const isHeld = selection.explode === 0 && step !== null && scene.steps[step].held.includes(part);
+    look.outline(moving || isHeld || picked);
     const own = scene.palette[scene.parts[part].colour];
     const isStuck = this.stuck.includes(part) && (selection.others.size === 0 || picked);
     const isEnd = step === null || scene.duration === 0;
     if (moving) look.paint(scene.colours.moving, "#000000", "#5a1e00");
+    else if (isHeld) look.paint(scene.colours.held, picked ? GLOW : "#000000", "#4a0012");
     else if (isEnd && this.free.has(part)) {
       const { free } = scene.colours;
       look.paint(free[this.free.get(part) % free.length], picked ? GLOW : "#000000", STUCK_EDGE);
