@@ -96,6 +96,9 @@ impl Standing<'_> {
             SteadySearch { steps: &ordered, limit, stability, is_out }.run(present)
         });
         match found {
+            Ok((order, None)) if order.len() < ordered.len() => {
+                return Some("the steps are in the order of the search: no other was found".to_owned());
+            }
             Ok((order, short)) => {
                 if let Some(short) = short {
                     end_early(assembly, outcome, &order, limit.unwrap_or_default(), &short);
@@ -142,7 +145,9 @@ fn ordered(removals: &[Removal]) -> Vec<OrderedRemoval> {
 /// The removals in another order (their places as they were), in which each comes after those that it requires. With more
 /// parts out than a path requires, it is free all the same.
 fn reordered(removals: &[Removal], order: &[usize]) -> Vec<Removal> {
-    let place = |removal: usize| order.iter().position(|&other| other == removal);
+    let mut places = vec![None; removals.len()];
+    order.iter().enumerate().for_each(|(place, &removal)| places[removal] = Some(place));
+    let place = |removal: usize| places[removal];
     let removal = |&number: &usize| {
         let removal = &removals[number];
         let mut requires: Vec<usize> = removal.requires.iter().filter_map(|&before| place(before)).collect();
@@ -257,9 +262,10 @@ where
     }
 
     fn state(&self, standing: Vec<usize>, stability: Stability, order: &[usize]) -> SteadyState {
+        let mut is_done = vec![false; self.steps.len()];
+        order.iter().for_each(|&number| is_done[number] = true);
         let is_ready = |number: &usize| {
-            !order.contains(number)
-                && self.steps[*number].requires.iter().all(|before| order.contains(before))
+            !is_done[*number] && self.steps[*number].requires.iter().all(|&before| is_done[before])
         };
         let mut pending: Vec<usize> = (0..self.steps.len()).filter(is_ready).collect();
         // What has to be held goes first.
@@ -363,6 +369,16 @@ mod tests {
         assert_eq!((order.len(), short), (3, None));
         assert_ne!(order[0], 0, "{order:?}");
         assert_eq!(found(&requires, Some(3), held).0.len(), 3);
+    }
+
+    /// Without a limit there is always a next step, unless a part that takes its turn is not out.
+    #[test]
+    fn an_order_that_cannot_go_on_gives_no_reason() {
+        let steps = [OrderedRemoval { parts: vec![1], requires: vec![], end: Some(Pose::identity()) }];
+        let stability = |_: &[usize]| Ok(Stability::default());
+        let is_out = |_: &[usize], _, _: &Pose| false;
+        let found = SteadySearch { steps: &steps, limit: None, stability, is_out }.run(&[0, 1]).unwrap();
+        assert_eq!(found, (vec![], None));
     }
 
     #[test]
