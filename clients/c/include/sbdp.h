@@ -1262,15 +1262,24 @@ typedef struct SbdpPlanOptions {
      */
     uint32_t reports;
     /**
+     * Not 0: put the steps into an order in which few parts have to be held at once. They then come when it is known.
+     */
+    uint32_t steady;
+    /**
+     * With `steady`: how many parts hands can hold at once, the one that moves included; 0 for any number. The plan ends
+     * before the first step that needs more.
+     */
+    uint32_t hands;
+    /**
      * Zero.
      */
-    uint32_t reserved_reports;
+    uint32_t reserved_hands;
     /**
-     * With `SBDP_REPORT_STABILITY`: the coefficient of friction of all contacts; null for 0.2.
+     * With `SBDP_REPORT_STABILITY` or `steady`: the coefficient of friction of all contacts; null for 0.2.
      */
     const double *friction;
     /**
-     * With `SBDP_REPORT_STABILITY`: the direction against gravity, three numbers, of any length but 0; null for `up`, and
+     * With `SBDP_REPORT_STABILITY` or `steady`: the direction against gravity, three numbers, of any length but 0; null for `up`, and
      * without that for +z.
      */
     const double *against_gravity;
