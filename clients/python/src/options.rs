@@ -185,7 +185,11 @@ pub(crate) fn options(
             "report" => reported = report_kinds(&value)?,
             "friction" => friction = value.extract()?,
             "steady" => steady = value.extract()?,
-            "hands" => hands = value.extract()?,
+            "hands" => {
+                let none = || PyValueError::new_err("hands: one is needed to move a part");
+                let given = value.extract::<Option<u32>>()?;
+                hands = given.map(|hands| NonZeroU32::new(hands).ok_or_else(none)).transpose()?;
+            }
             "groups" => {
                 if one_of(&key, &value, &[("needed", false), ("prefer", true)])? {
                     options.groups = groups(py, data)?;
