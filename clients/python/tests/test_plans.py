@@ -56,6 +56,27 @@ def test_json_is_what_the_command_line_writes(client, runtime_dir, folder, toget
     assert here.to_dict() == json.loads(there)
 
 
+def test_reports_and_orders_are_those_of_the_command_line(client, runtime_dir):
+    path = ASSEMBLIES / "bolted-bracket-20"
+    assembly = sbdp.load(path)
+    words = ["--report", "stability,clearance,tools", "--up", "-z", "--friction", "0.3"]
+    options = {"report": ["stability", "clearance", "tools"], "up": "-z", "friction": 0.3}
+    for hands, more in ((None, []), (2, ["--hands", "2"])):
+        asked = options | ({} if hands is None else {"hands": hands})
+        here = client.plan(assembly, **asked).result().to_dict()
+        there = json.loads(command_line(runtime_dir, path, *words, *more))
+        assert here["steps"] == there["steps"] and here["initial"] == there["initial"]
+        assert all(step["tools"] is not None and step["clearance"]["touching"] is not None for step in here["steps"])
+        held = [sum(len(u["hold"][0]) for u in step["stability"]["unstable"]) for step in here["steps"]]
+        assert max(held) > 1 if hands is None else max(held) == 1
+    assert client.plan(assembly, hands=1, up="-z").result().status == "exhausted"
+    for wrong in ({"report": "weather"}, {"hands": 0}):
+        with pytest.raises(ValueError, match=next(iter(wrong))):
+            client.plan(assembly, **wrong)
+    with pytest.raises(sbdp.Error, match="friction"):
+        client.plan(assembly, steady=True, friction=-1.0).result()
+
+
 def test_options_mean_what_they_mean_on_the_command_line(client, runtime_dir):
     path = ASSEMBLIES / "pin-bolt-cover"
     assembly = sbdp.load(path, ignore=["nothing*"])
