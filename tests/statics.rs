@@ -145,8 +145,8 @@ fn a_bolt_follows_its_nut_where_it_would_have_to_be_held() {
     assert_eq!(required(&plan), required(&steady));
 }
 
-/// With so many hands as an order needs there is one, and with fewer the plan ends early and says why; in the same way from
-/// the daemon, and put together.
+/// With as many hands as the order needs, the plan is complete. With one fewer it ends early, and the reason names what has
+/// to be held. The daemon answers the same. An assembly plan has the same order backwards.
 #[test]
 fn a_plan_ends_where_it_needs_more_hands() {
     let folder = tempfile::tempdir().unwrap();

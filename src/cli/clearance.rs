@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::args::ClearanceArguments;
 use super::error::CliError;
+use super::report_lines::pass;
 use super::subject::Subject;
 use super::table::{TextTable, length, listed};
 use super::{interrupt, show};
@@ -113,17 +114,7 @@ fn table(document: &ClearancesDocument<'_>) -> String {
 fn verdict(document: &ClearancesDocument<'_>, wanted: f64) -> String {
     let units = document.units;
     let short = document.steps.iter().flat_map(|step| step.short.iter().map(move |pair| (step.step, pair)));
-    let line = |(step, pair): (usize, &ClosestDocument)| {
-        format!(
-            "step {}: {} passes {} at {} (certain is {}), as assembled {}\n",
-            step + 1,
-            pair.moving,
-            pair.standing,
-            length(pair.distance, units),
-            length(pair.at_least, units),
-            length(pair.assembled, units)
-        )
-    };
+    let line = |(step, pair): (usize, &ClosestDocument)| format!("{}\n", pass(step, pair, units));
     let lines: String = short.map(line).collect();
     if lines.is_empty() {
         format!("All parts keep {}, or what they have as they stand.", length(wanted, units))

@@ -39,18 +39,20 @@ pub(super) fn clearance(plan: &PlanDocument, verbose: bool) -> Vec<String> {
         passing.sort_by(|(_, a), (_, b)| a.at_least.total_cmp(&b.at_least));
         passing.truncate(1);
     }
-    let line = |(number, closest): &(usize, &ClosestDocument)| {
-        format!(
-            "step {}: {} passes {} at {} (certain is {}), as assembled {}",
-            number + 1,
-            closest.moving,
-            closest.standing,
-            length(closest.distance, units),
-            length(closest.at_least, units),
-            length(closest.assembled, units)
-        )
-    };
-    passing.iter().map(line).collect()
+    passing.iter().map(|(number, closest)| pass(*number, closest, units)).collect()
+}
+
+/// How near one part passes another in a step.
+pub(super) fn pass(step: usize, closest: &ClosestDocument, units: Option<&str>) -> String {
+    format!(
+        "step {}: {} passes {} at {} (certain is {}), as assembled {}",
+        step + 1,
+        closest.moving,
+        closest.standing,
+        length(closest.distance, units),
+        length(closest.at_least, units),
+        length(closest.assembled, units)
+    )
 }
 
 /// The fasteners that no tool can turn.
