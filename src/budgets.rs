@@ -458,6 +458,15 @@ pub(crate) const APPROACH_ITEMS: usize = 300_000;
 /// Vertices of a patch (three for each triangle at most) whose hull bounds its distance. At half, only leaves have hulls;
 /// at double, the hull of a patch takes longer than those of its parts.
 pub(crate) const APPROACH_HULL: usize = 64;
+/// Rounds in which a path is pushed away from what it comes too near to. A leg along a wall needs 2 or 3, a bend around an
+/// edge up to 10. At half, some bends are given up; at double, ways without room take twice as long to be given up.
+pub(crate) const BAND_ROUNDS: usize = 24;
+/// Of these rounds, each one of this number adds a waypoint where the path is furthest off. At half, paths get waypoints
+/// that they do not need; at double, what needs two of them is given up.
+pub(crate) const BAND_ROUNDS_PER_WAYPOINT: usize = 4;
+/// How many times all pushes of a round are satisfied in turn. They need not be satisfied to the digit: the next round
+/// measures anew. At half, a leg in a corner takes more rounds; at double, nothing changes.
+pub(crate) const BAND_PROJECTIONS: usize = 16;
 
 // Converters of STEP files. Measured with the converters in `clients/step` (OCCT 8.0, November 2026, two slow cores):
 // 0.6 s to start, 0.4 s and 14 MB of memory per MB of plane faces, 1 s per MB of curved ones.

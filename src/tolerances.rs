@@ -574,10 +574,24 @@ pub(crate) const APPROACH_PRECISION: f64 = 0.01;
 /// times the rounding of binary STL files, whose coordinates are 10 times as large as the part. At half, touching parts of
 /// such files have a clearance; at double, so have fewer fits.
 pub(crate) const ASSEMBLED_CONTACT: f64 = 1e-5;
+/// Share of a shift of waypoints that arrives at a place between them. Where less arrives, as near the start, which stays, the
+/// path gets a waypoint. At half, a path is bent ten times as far as it needs to be; at double, it gets waypoints where a
+/// bend three times as far would do.
+pub(crate) const BAND_LEVER: f64 = 0.2;
 /// Share of the width across flats. A tool that comes nearer than this to a part does not pass it: the play of a ring on its
 /// hexagon is 0.01 to 0.02 (ISO 691). At half, tools pass that scrape; at double, a ring on a low nut touches what the
 /// nut stands on.
 pub(crate) const TOOL_GAP: f64 = 0.01;
+
+// Floors.
+
+/// Share of the longest side of an assembly by which its floor reaches beyond it on each side. A part that leaves sideways is out
+/// beyond the floor. At half, long parts are let down beside the floor; at double, sideways paths are a quarter of the
+/// assembly longer.
+pub(crate) const FLOOR_MARGIN: f64 = 0.25;
+/// Share of the side of a floor. At half, thin parts pass it a little deeper (tolerances follow the thickness of parts); at
+/// double, pictures show more of it.
+pub(crate) const FLOOR_THICKNESS: f64 = 0.02;
 
 // Tessellation of STEP files.
 

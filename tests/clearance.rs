@@ -112,6 +112,37 @@ fn what_cannot_be_asked_is_refused_by_name() {
     }
 }
 
+/// The slider of a closed room leaves through the hole in its roof; a way that touches the wall is pushed away from it.
+#[test]
+fn a_plan_keeps_the_clearance_that_is_wanted() {
+    let folder = tempfile::tempdir().unwrap();
+    let parts = folder.path().join("parts");
+    fs::create_dir(&parts).unwrap();
+    // A roof over the block leaves it one way: towards the right wall, and up along it.
+    cuboid(&parts.join("block.obj"), [0.0, 0.0, 0.5], [10.0, 10.0, 10.0]);
+    cuboid(&parts.join("left.obj"), [-8.0, -20.0, 0.0], [-2.0, 20.0, 30.0]);
+    cuboid(&parts.join("plate.obj"), [-20.0, -20.0, -5.0], [40.0, 20.0, 0.0]);
+    cuboid(&parts.join("right.obj"), [30.0, -20.0, 0.0], [38.0, 20.0, 30.0]);
+    cuboid(&parts.join("roof.obj"), [-2.0, -20.0, 12.0], [16.0, 20.0, 14.0]);
+    cuboid(&parts.join("front.obj"), [-8.0, -24.0, 0.0], [38.0, -20.0, 30.0]);
+    cuboid(&parts.join("rear.obj"), [-8.0, 20.0, 0.0], [38.0, 24.0, 30.0]);
+    let fixed = ["left", "plate", "right", "roof", "front", "rear"].map(|part| ["--fixed", part]).concat();
+    let planned = |clearance: &str| {
+        let command = ["plan", "parts", "--embedded", "-q", "--json", "plan.json", "--clearance", clearance];
+        sbdp(folder.path(), &[&command[..], &fixed].concat()).status.code()
+    };
+    for (given, code) in [("1.5", Some(0)), ("3", Some(3))] {
+        // There are 14 between the roof and the wall, and the block has 10 of them.
+        assert_eq!(planned(given), code, "{given}");
+        if code == Some(0) {
+            assert_eq!(clearance(folder.path(), &["--at-least", given]).0, Some(0));
+        }
+    }
+    let plan: Value = serde_json::from_slice(&fs::read(folder.path().join("plan.json")).unwrap()).unwrap();
+    let reason = plan["reason"].as_str().unwrap();
+    assert!(plan["status"] == "exhausted" && reason.contains("% of the wanted distance from"), "{reason}");
+}
+
 #[test]
 fn what_is_not_certain_is_not_said_to_be_kept() {
     // All along the thread, the flanks of bolt and nut are equally near: more than can be looked into.

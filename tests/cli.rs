@@ -318,8 +318,13 @@ fn a_given_base_stays_and_what_contradicts_itself_is_refused() {
         &plan("pin-bolt-cover", &["--base", "cover", "--target", "cover"]),
         &["part `cover` is a target and in `base`"],
     );
-    refused(&plan("pin-bolt-cover", &["--clearance", "-1"]), &["`clearance` is -1"]);
+    refused(&plan("pin-bolt-cover", &["--end-gap", "-1"]), &["`end_gap` is -1"]);
     refused(&plan("pin-bolt-cover", &["--up", "0,0,0"]), &["--up", "+z", "0,0,0"]);
+    refused(&plan("pin-bolt-cover", &["--clearance", "nan"]), &["`clearance` is NaN"]);
+    refused(
+        &plan("pin-bolt-cover", &["--keep-out", "pin", "--target", "pin"]),
+        &["part `pin` is a target and in `keep_out`"],
+    );
 }
 
 #[test]

@@ -187,6 +187,40 @@ fn a_plan_ends_where_it_needs_more_hands() {
     assert_eq!(backwards, order(&steady));
 }
 
+/// Upside down, the pin falls on the slider; while one hand moves the slider aside, another one has to hold the pin.
+#[test]
+fn hands_are_counted_while_parts_are_moved_aside() {
+    let folder = tempfile::tempdir().unwrap();
+    let assembly = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/assemblies/covered-pin");
+    let planned = |hands: &str| {
+        let plan = [
+            "plan",
+            assembly,
+            "--embedded",
+            "-q",
+            "--up=-z",
+            "--target",
+            "pin",
+            "--hands",
+            hands,
+            "--json",
+            "-",
+        ];
+        let found = sbdp(folder.path(), &plan);
+        (found.status.code(), serde_json::from_slice::<Value>(&found.stdout).unwrap())
+    };
+    let (code, plan) = planned("2");
+    assert_eq!((code, &plan["steps"][0]["ends"]), (Some(0), &"aside".into()), "{plan}");
+    let (code, plan) = planned("1");
+    assert_eq!(
+        (code, &plan["status"], &plan["steps"]),
+        (Some(3), &"exhausted".into(), &serde_json::json!([]))
+    );
+    let reason = plan["reason"].as_str().unwrap();
+    assert!(reason.contains("slider: 1 for that, and 1 to hold pin"), "{reason}");
+    assert_eq!(plan["remaining"], serde_json::json!(["housing", "slider", "pin"]));
+}
+
 #[test]
 fn an_assembly_plan_has_the_states_of_the_disassembly_backwards() {
     let folder = tempfile::tempdir().unwrap();

@@ -97,6 +97,9 @@ pub struct SourceDocument {
     /// Files and folders of further parts (`--added`).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub added: Vec<String>,
+    /// The floor that the assembly stands on (`--floor`): the part `floor`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub floor: Option<FloorDocument>,
     /// What counted as a part in files that hold several (`--split`).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub split: Option<String>,
@@ -106,6 +109,17 @@ pub struct SourceDocument {
     /// mm: how far triangles made of STEP files may be from the surfaces (`--deflection`).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub deflection: Option<f64>,
+}
+
+/// A square plate under an assembly. Lengths are in the plan's units and frame.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FloorDocument {
+    /// The direction up, a unit vector.
+    pub up: [f64; 3],
+    /// The middle of its upper face.
+    pub centre: [f64; 3],
+    /// The side of the square.
+    pub side: f64,
 }
 
 /// A group that the input names.

@@ -63,6 +63,6 @@ pub type Transport = iceoryx2::prelude::ipc_threadsafe::Service;
 
 /// Version of this contract, a count of its incompatible changes. It is part of every service name, so that a client
 /// never opens a service of another version.
-pub const PROTOCOL: u32 = 10;
+pub const PROTOCOL: u32 = 11;
 /// The iceoryx2 version both sides must have: nodes and services carry it.
 pub const ICEORYX2_VERSION: &str = "0.10.0";

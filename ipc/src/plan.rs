@@ -32,8 +32,8 @@ pub const PLAN_NO_STAGING: u32 = 64;
 
 /// Send the events of the search, too. The search then runs even if the plan is remembered.
 pub const PLAN_TRACE: u32 = 128;
-/// The header's `clearance` is given.
-pub const PLAN_HAS_CLEARANCE: u32 = 256;
+/// The header's `end_gap` is given.
+pub const PLAN_HAS_END_GAP: u32 = 256;
 /// The header's `up` is given.
 pub const PLAN_HAS_UP: u32 = 512;
 /// Report how the parts stand before the first step and after each step.
@@ -73,7 +73,7 @@ pub const PENALTY_PARAMETERS: [&str; 16] = [
     "newton-tolerance",
 ];
 
-/// Header of a plan request; five lists of u32 part numbers follow: fixed, removed, targets, base, keep; then the sizes
+/// Header of a plan request; six lists of u32 part numbers follow: fixed, removed, targets, base, keep, keep_out; then the sizes
 /// of the groups (u32) and their parts (u32), group after group; then [`MovedPart`]s: those that stand elsewhere, and
 /// those that wait at given places; then [`PenaltyRecord`]s.
 #[repr(C)]
@@ -88,7 +88,7 @@ pub struct PlanRequestHeader {
     /// Index into [`ACTION_SETS`].
     pub actions: u32,
     /// [`PLAN_NO_CACHE`], [`PLAN_HAS_TARGETS`], [`PLAN_SWEEPS`], [`PLAN_NO_SWEEPS`], [`PLAN_BATCH`],
-    /// [`PLAN_ASSEMBLY`], [`PLAN_NO_STAGING`], [`PLAN_TRACE`], [`PLAN_HAS_CLEARANCE`], [`PLAN_HAS_UP`],
+    /// [`PLAN_ASSEMBLY`], [`PLAN_NO_STAGING`], [`PLAN_TRACE`], [`PLAN_HAS_END_GAP`], [`PLAN_HAS_UP`],
     /// [`PLAN_REPORT_STABILITY`], [`PLAN_REPORT_CLEARANCE`], [`PLAN_REPORT_TOOLS`], [`PLAN_STEADY`].
     pub flags: u32,
     /// Threads for this request; 0 leaves it to the daemon.
@@ -116,6 +116,10 @@ pub struct PlanRequestHeader {
     /// With [`PLAN_STEADY`]: how many parts hands can hold at once, the one that moves included; 0 for any number. 0 without
     /// it.
     pub hands: u32,
+    /// How many parts are in the way and do not come apart.
+    pub keep_out: u32,
+    /// Reserved, 0.
+    pub reserved: u32,
     /// The deadline of the answer, in nanoseconds of CLOCK_MONOTONIC; 0 for none.
     pub deadline_ns: u64,
     /// Simulations after which to give up; `u64::MAX` for no limit.
@@ -127,8 +131,8 @@ pub struct PlanRequestHeader {
     pub planning_timeout_ns: u64,
     /// Seed of the random poses of `rrt` and `bk-rrt`.
     pub seed: u64,
-    /// The gap between hulls where a path out ends, in the input's units; ignored without [`PLAN_HAS_CLEARANCE`].
-    pub clearance: f64,
+    /// The gap between hulls where a path out ends, in the input's units; ignored without [`PLAN_HAS_END_GAP`].
+    pub end_gap: f64,
     /// The direction up, in the input's frame, of any length but 0; ignored without [`PLAN_HAS_UP`].
     pub up: [f64; 3],
     /// The coefficient of friction of all contacts, from 0 up; 0 without [`PLAN_REPORT_STABILITY`] and [`PLAN_STEADY`].
@@ -136,6 +140,8 @@ pub struct PlanRequestHeader {
     /// The direction against gravity, in the input's frame, of any length but 0; 0 without [`PLAN_REPORT_STABILITY`] and
     /// [`PLAN_STEADY`].
     pub against_gravity: [f64; 3],
+    /// The distance that parts keep from what they pass, in the input's units; 0 for none.
+    pub clearance: f64,
 }
 
 /// A parameter of the engine `penalty`.
@@ -215,12 +221,12 @@ pub struct StepsHeader {
 }
 
 const _: () = {
-    assert!(size_of::<PlanRequestHeader>() == 200 && align_of::<PlanRequestHeader>() == 8);
+    assert!(size_of::<PlanRequestHeader>() == 216 && align_of::<PlanRequestHeader>() == 8);
     assert!(offset_of!(PlanRequestHeader, planner) == 32);
     assert!(offset_of!(PlanRequestHeader, moved) == 68);
     assert!(offset_of!(PlanRequestHeader, static_analysis) == 76);
-    assert!(offset_of!(PlanRequestHeader, deadline_ns) == 96);
-    assert!(offset_of!(PlanRequestHeader, up) == 144 && offset_of!(PlanRequestHeader, friction) == 168);
+    assert!(offset_of!(PlanRequestHeader, deadline_ns) == 104);
+    assert!(offset_of!(PlanRequestHeader, up) == 152 && offset_of!(PlanRequestHeader, friction) == 176);
     assert!(size_of::<PenaltyRecord>() == 16 && offset_of!(PenaltyRecord, value) == 8);
     assert!(size_of::<MovedPart>() == 64 && offset_of!(MovedPart, motion) == 8);
     assert!(size_of::<StepRecord>() == 72 && align_of::<StepRecord>() == 8);
@@ -311,7 +317,10 @@ pub struct PlanRequest {
     pub seed: u64,
     /// The gap between a part's hull and that of the rest where its path out ends, in the input's units; `None` leaves
     /// it to the daemon.
-    pub clearance: Option<f64>,
+    pub end_gap: Option<f64>,
+    /// The distance that parts keep from what they pass on their way, in the input's units, at least 0. Pairs that are nearer as
+    /// they stand keep what they have.
+    pub clearance: f64,
     /// The direction up, in the input's frame, of any length but 0; `None` leaves it to the daemon.
     pub up: Option<[f64; 3]>,
     /// Simulations after which to give up.
@@ -330,6 +339,8 @@ pub struct PlanRequest {
     pub base: Vec<u32>,
     /// Parts that stay unless others that are asked for cannot leave otherwise; they are not asked for.
     pub keep: Vec<u32>,
+    /// Parts that are in the way and do not come apart, as a fixture or a table: they may not move, and are no base.
+    pub keep_out: Vec<u32>,
     /// Groups that should leave as wholes, to be taken apart afterwards.
     pub groups: Vec<Vec<u32>>,
     /// Parts that stand elsewhere than in the assembly.
@@ -364,7 +375,7 @@ impl PlanRequest {
             flags: flag(self.no_cache, PLAN_NO_CACHE)
                 | flag(self.batch, PLAN_BATCH)
                 | flag(self.trace, PLAN_TRACE)
-                | flag(self.clearance.is_some(), PLAN_HAS_CLEARANCE)
+                | flag(self.end_gap.is_some(), PLAN_HAS_END_GAP)
                 | flag(self.up.is_some(), PLAN_HAS_UP)
                 | flag(self.steady.is_some(), PLAN_STEADY)
                 | flag(self.reports.stability, PLAN_REPORT_STABILITY)
@@ -386,18 +397,22 @@ impl PlanRequest {
             groups: self.groups.len() as u32,
             keep: self.keep.len() as u32,
             hands: self.steady.and_then(|steady| steady.hands).map_or(0, NonZeroU32::get),
+            keep_out: self.keep_out.len() as u32,
+            reserved: 0,
             deadline_ns: self.deadline_ns.unwrap_or(0),
             max_simulations: self.max_simulations.unwrap_or(u64::MAX),
             path_timeout_ns: self.path_timeout_ns.unwrap_or(u64::MAX),
             planning_timeout_ns: self.planning_timeout_ns.unwrap_or(u64::MAX),
             seed: self.seed,
-            clearance: self.clearance.unwrap_or(0.0),
+            end_gap: self.end_gap.unwrap_or(0.0),
             up: self.up.unwrap_or_default(),
             friction: gravity.map_or(0.0, |gravity| gravity.friction),
             against_gravity: gravity.map_or([0.0; 3], |gravity| gravity.up),
+            clearance: self.clearance,
         });
         let sizes: Vec<u32> = self.groups.iter().map(|group| group.len() as u32).collect();
-        writer.array(&self.fixed).array(&self.removed).array(targets).array(&self.base).array(&self.keep);
+        writer.array(&self.fixed).array(&self.removed).array(targets).array(&self.base);
+        writer.array(&self.keep).array(&self.keep_out);
         writer.array(&sizes).array(&self.groups.concat());
         writer.array(&self.moved).array(staged).array(&self.penalty);
         writer.finish()
@@ -415,6 +430,7 @@ impl PlanRequest {
         let targets = reader.array::<u32>("targets", u64::from(h.targets))?.to_vec();
         let base = reader.array::<u32>("base", u64::from(h.base))?.to_vec();
         let keep = reader.array::<u32>("keep", u64::from(h.keep))?.to_vec();
+        let keep_out = reader.array::<u32>("keep_out", u64::from(h.keep_out))?.to_vec();
         let sizes = reader.array::<u32>("groups", u64::from(h.groups))?;
         let in_groups = sizes.iter().map(|&size| u64::from(size)).sum();
         let mut in_groups = reader.array::<u32>("parts of groups", in_groups)?;
@@ -435,7 +451,7 @@ impl PlanRequest {
             | PLAN_ASSEMBLY
             | PLAN_NO_STAGING
             | PLAN_TRACE
-            | PLAN_HAS_CLEARANCE
+            | PLAN_HAS_END_GAP
             | PLAN_HAS_UP
             | PLAN_REPORT_STABILITY
             | PLAN_REPORT_CLEARANCE
@@ -468,13 +484,15 @@ impl PlanRequest {
             path_timeout_ns: limit(h.path_timeout_ns),
             planning_timeout_ns: limit(h.planning_timeout_ns),
             seed: h.seed,
-            clearance: set(PLAN_HAS_CLEARANCE).then_some(h.clearance),
+            end_gap: set(PLAN_HAS_END_GAP).then_some(h.end_gap),
+            clearance: h.clearance,
             up: set(PLAN_HAS_UP).then_some(h.up),
             fixed,
             removed,
             targets: set(PLAN_HAS_TARGETS).then_some(targets),
             base,
             keep,
+            keep_out,
             groups,
             moved,
             assembly: set(PLAN_ASSEMBLY).then_some(if set(PLAN_NO_STAGING) {

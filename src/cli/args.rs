@@ -153,7 +153,11 @@ pub(super) struct PlanArguments {
     /// Distance between the hulls of a part and of the rest where its path ends, in the input's units [default: a
     /// hundredth of the part's longest side]
     #[arg(long, value_name = "LENGTH", allow_negative_numbers = true, help_heading = WHAT)]
-    pub(super) clearance: Option<f64>,
+    pub(super) end_gap: Option<f64>,
+    /// Distance that parts keep from what they pass on their way, in the input's units. Pairs that are nearer as they stand
+    /// keep what they have, and those that touch as they stand may touch
+    #[arg(long, value_name = "LENGTH", default_value_t = 0.0, hide_default_value = true, allow_negative_numbers = true, help_heading = WHAT)]
+    pub(super) clearance: f64,
     /// The direction up, as +z or as a vector: upward paths come before sideways ones, and these before downward ones
     /// [default: the direction in which most parts can go at first]
     #[arg(long, value_name = "X,Y,Z", value_parser = direction, allow_hyphen_values = true, help_heading = WHAT)]
@@ -187,6 +191,12 @@ pub(super) struct PlanArguments {
     /// A part that stays unless others that are asked for cannot leave otherwise (repeatable)
     #[arg(long, value_name = "PART", help_heading = WHAT)]
     pub(super) keep: Vec<String>,
+    /// A part that is in the way and does not come apart, as a fixture or a table: it may not move, and is no base (repeatable)
+    #[arg(long, value_name = "PART", help_heading = WHAT)]
+    pub(super) keep_out: Vec<String>,
+    /// Add a floor under the lowest point, as a part `floor` that is in the way: nothing passes below it, and parts stand on it
+    #[arg(long, help_heading = WHAT)]
+    pub(super) floor: bool,
     /// A part that has been removed already (repeatable)
     #[arg(long, value_name = "PART", help_heading = WHAT)]
     pub(super) removed: Vec<String>,

@@ -6,6 +6,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use sbdp_client::ConnectOptions;
+use sbdp_ipc::document::FloorDocument;
 use sbdp_ipc::plan::{Gravity, Reports};
 
 use super::args::{GroupsArgument, PlanArguments, ReportArgument};
@@ -22,7 +23,7 @@ use crate::cache::CacheSettings;
 use crate::document::{PlanDocument, SourceDocument};
 use crate::document::{absolute, content_of, source, with_files};
 use crate::files::{LoadOptions, customary_up, load};
-use crate::geometry::{Revision, SourceAssembly, content_hash, pose_from_waypoint};
+use crate::geometry::{Floor, Revision, SourceAssembly, content_hash, pose_from_waypoint};
 use crate::search::{PlanRequest, Planner, SteadyOrder, Termination};
 use crate::simulation::PenaltyParameters;
 
@@ -57,7 +58,9 @@ pub(super) fn planned(arguments: &PlanArguments) -> Result<Planned, CliError> {
     if let Some(rotation) = &arguments.rotate {
         assembly.rotate(rotation);
     }
-    let revision = revision(arguments, &assembly, &further(&options))?;
+    let mut revision = revision(arguments, &assembly, &further(&options))?;
+    let floor = arguments.floor.then(|| floor_under(arguments, &assembly, &revision)).transpose()?;
+    revision.added.extend(floor.map(|floor| floor.part()));
     let revised = assembly.revised(&revision);
     let request = request(arguments, &revised)?;
     let reports = reports(arguments);
@@ -82,7 +85,14 @@ pub(super) fn planned(arguments: &PlanArguments) -> Result<Planned, CliError> {
     listener.finish()?;
     let plan = plan?;
     let revision = question.revision;
-    let source = source_of(arguments, content_of(&content, &revision));
+    let source = SourceDocument {
+        floor: floor.map(|floor| FloorDocument {
+            up: (*floor.up).into(),
+            centre: floor.centre.into(),
+            side: floor.side,
+        }),
+        ..source_of(arguments, content_of(&content, &revision))
+    };
     let document = with_files(plan, &assembly, source);
     Ok(Planned { revised, subject: Subject::new(assembly, revision, document) })
 }
@@ -100,11 +110,29 @@ fn source_of(arguments: &PlanArguments, content: String) -> SourceDocument {
     }
 }
 
+/// The floor under an assembly with what differs from it.
+fn floor_under(
+    arguments: &PlanArguments,
+    assembly: &SourceAssembly,
+    revision: &Revision,
+) -> Result<Floor, CliError> {
+    let revised = assembly.revised(revision);
+    let refused = |words: &str| CliError::Refused(format!("--floor: {words}"));
+    if revised.parts.iter().any(|part| part.name == Floor::NAME) {
+        return Err(refused("the assembly has a part `floor` already; name it by --keep-out"));
+    }
+    let up = arguments.up.unwrap_or_else(|| customary_up(assembly));
+    Floor::under(&revised, up).ok_or_else(|| refused("the assembly has no finite size"))
+}
+
 fn request(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<PlanRequest, CliError> {
     let fixed = [&assembly.fixed[..], &arguments.fixed[..]].concat();
     let targets = resolve(assembly, "--target", &arguments.target)?;
     let base = if arguments.base.is_empty() { &assembly.base } else { &arguments.base };
     let keep = if arguments.keep.is_empty() { &assembly.keep } else { &arguments.keep };
+    let mut keep_out =
+        if arguments.keep_out.is_empty() { &assembly.keep_out } else { &arguments.keep_out }.clone();
+    keep_out.extend(arguments.floor.then(|| Floor::NAME.to_owned()));
     let planner = Planner::from(arguments.planner);
     Ok(PlanRequest {
         planner,
@@ -112,6 +140,7 @@ fn request(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<PlanR
         actions: arguments.actions.map_or_else(|| planner.default_actions(), Into::into),
         static_analysis: arguments.dbg.map(Into::into).unwrap_or_default(),
         sweeps: arguments.sweeps.asked(),
+        end_gap: arguments.end_gap,
         clearance: arguments.clearance,
         up: arguments.up,
         seed: arguments.seed,
@@ -124,6 +153,7 @@ fn request(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<PlanR
         removed: resolve(assembly, "--removed", &arguments.removed)?,
         base: resolve(assembly, "--base", base)?,
         keep: resolve(assembly, "--keep", keep)?,
+        keep_out: resolve(assembly, "--keep-out", &keep_out)?,
         groups: preferred_groups(arguments, assembly)?,
         targets: (!arguments.target.is_empty()).then_some(targets),
         steady: steady(arguments, assembly),

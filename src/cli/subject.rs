@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Quaternion, UnitQuaternion};
+use nalgebra::{Quaternion, Unit, UnitQuaternion};
+use sbdp_ipc::document::FloorDocument;
 
 use super::error::CliError;
 use super::part_names::part_named;
@@ -13,7 +14,7 @@ use crate::document::{MOTION_ROUNDING, Placements, kind_of};
 use crate::document::{PlanDocument, SourceDocument};
 use crate::files::{LoadOptions, StepSettings, customary_up, load};
 use crate::geometry::{
-    Assembly, Pose, Revision, SourceAssembly, SourceMesh, content_hash, pose_from_waypoint,
+    Assembly, Floor, Pose, Revision, SourceAssembly, SourceMesh, content_hash, pose_from_waypoint,
 };
 use crate::plan::PlanKind;
 use crate::search::Termination;
@@ -204,6 +205,11 @@ fn revision(
     }
     for path in &source.added {
         revision.added.extend(load(Path::new(path), &options)?.parts);
+    }
+    if let Some(FloorDocument { up, centre, side }) = source.floor {
+        let refused = || CliError::Refused("`source.floor` in the plan: `up` is no direction".to_owned());
+        let up = Unit::try_new(up.into(), 0.0).ok_or_else(refused)?;
+        revision.added.push(Floor { up, centre: centre.into(), side }.part());
     }
     Ok(revision)
 }

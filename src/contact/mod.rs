@@ -12,6 +12,7 @@
 //! | which path off a thread keeps its surfaces furthest apart | `helix_profile::path_on_thread` | a path |
 //! | which ways lead a part off the threads that it shares with others | `helix_profile::ways_off` | paths |
 //! | how near bodies pass others on their way | [`closest_approach`] | a distance, and a bound |
+//! | whether a body keeps a distance from another on its way | [`PassingPair`] | where it does not |
 //! | whether the hulls of a body and of all others are apart | [`exit_direction`](crate::scene::exit_direction) | a direction |
 //!
 //! `course` says how points move along a path, [`PairPath`] which way a body takes past another. Contact knows the scene
@@ -23,6 +24,7 @@ pub(crate) mod course;
 pub(crate) mod helix_profile;
 mod obstruction;
 mod pair_path;
+mod passing;
 pub(crate) mod region_cover;
 pub(crate) mod sampled;
 mod shape_cast;
@@ -30,6 +32,7 @@ mod shape_cast;
 pub use closest_approach::{ClosestApproach, PassedPair, closest_approach};
 pub use obstruction::{is_seen_to_enter, obstruction};
 pub use pair_path::PairPath;
+pub use passing::PassingPair;
 pub use region_cover::ShiftCoverCache;
 pub use sampled::{passes_straight, seems_clear};
 pub use shape_cast::{CastMargins, ShapeCast};

@@ -32,6 +32,7 @@ pub(crate) fn plan_request(
         engine: engine(request.engine)?,
         actions: actions(request.actions)?,
         sweeps: request.sweeps,
+        end_gap: request.end_gap,
         clearance: request.clearance,
         up: request.up,
         seed: request.seed,
@@ -46,6 +47,7 @@ pub(crate) fn plan_request(
         targets: request.targets.as_deref().map(indices),
         base: indices(&request.base),
         keep: indices(&request.keep),
+        keep_out: indices(&request.keep_out),
         groups: request.groups.iter().map(|group| indices(group)).collect(),
         steady: request.steady.map(|steady| SteadyOrder {
             up: request.gravity.up,

@@ -27,6 +27,9 @@ pub(super) struct Description {
     /// Parts that stay unless others cannot leave otherwise, by name.
     #[serde(default)]
     keep: Vec<String>,
+    /// Parts that are in the way and do not come apart, by name.
+    #[serde(default)]
+    keep_out: Vec<String>,
     /// Parts that belong together, by the group's name.
     #[serde(default)]
     groups: BTreeMap<String, Vec<String>>,
@@ -146,14 +149,14 @@ impl Described {
             found.map(|p| p.name.clone()).ok_or_else(|| self.refused(format!("there is no part `{name}`")))
         };
         let all = |names: &Vec<String>| names.iter().map(resolve).collect::<Result<Vec<_>, _>>();
-        let [fixed, base, keep] =
-            [all(&description.fixed)?, all(&description.base)?, all(&description.keep)?];
+        let Description { fixed, base, keep, keep_out, .. } = description;
+        let [fixed, base, keep, keep_out] = [all(fixed)?, all(base)?, all(keep)?, all(keep_out)?];
         description.densities.keys().try_for_each(|n| resolve(n).map(drop))?;
         let group = |(name, parts): (&String, &Vec<String>)| {
             Ok(SourceGroup { name: printable(name), parts: all(parts)? })
         };
         let groups = description.groups.iter().map(group).collect::<Result<Vec<_>, GeometryError>>()?;
-        (assembly.fixed, assembly.base, assembly.keep) = (fixed, base, keep);
+        (assembly.fixed, assembly.base, assembly.keep, assembly.keep_out) = (fixed, base, keep, keep_out);
         assembly.groups.extend(groups);
         if let Some(name) = &description.name {
             assembly.name.clone_from(name);

@@ -52,6 +52,9 @@ pub struct SourceAssembly {
     /// Names of parts that stay unless others cannot leave otherwise, if the description says so. Not content, either.
     #[serde(skip)]
     pub keep: Vec<String>,
+    /// Names of parts that are in the way and do not come apart, if the description says so. Not content, either.
+    #[serde(skip)]
+    pub keep_out: Vec<String>,
     /// How far triangles may be from the surfaces that they stand for, where these were made from others (STEP):
     /// overlaps up to that depth may be of the triangles alone. In the assembly's units. Not content, either.
     #[serde(skip)]

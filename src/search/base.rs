@@ -81,13 +81,14 @@ impl Problem<'_> {
 
 impl Candidates {
     fn of(problem: &Problem<'_>, standing: &[usize], up: &Vector3<f64>) -> Option<Self> {
-        let Problem { scene, fixed, targets, .. } = problem;
+        let Problem { scene, fixed, targets, keep_out, .. } = problem;
         let is_target = |part: &usize| targets.as_ref().is_some_and(|t| t.contains(part));
+        let standing: Vec<usize> = standing.iter().copied().filter(|part| !keep_out.contains(part)).collect();
         if standing.len() < 2 || standing.iter().any(|part| fixed.contains(part)) {
             return None;
         }
         let free = standing.iter().filter(|part| !is_target(part));
-        let all: Vec<Candidate> = free.map(|&part| Candidate::of(scene, standing, part, up)).collect();
+        let all: Vec<Candidate> = free.map(|&part| Candidate::of(scene, &standing, part, up)).collect();
         let most = |of: fn(&Candidate) -> f64| all.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
         let heights = (-most(|c| -c.low), most(|c| c.low));
         let most = (most(|c| c.size), most(|c| c.neighbours as f64));
@@ -172,5 +173,8 @@ mod tests {
         assert_eq!(wanted.chosen_base(&[0, 1, 2], &Vector3::z()).parts, [0]);
         let fixed = Problem { fixed: vec![2], ..problem };
         assert_eq!(fixed.chosen_base(&[0, 1, 2], &Vector3::z()), Base::default());
+        // What is only in the way is none, and leaves the choice.
+        let in_the_way = Problem { keep_out: vec![2], ..fixed };
+        assert_eq!(in_the_way.chosen_base(&[0, 1, 2], &Vector3::z()).parts, [0]);
     }
 }

@@ -76,7 +76,7 @@ impl<'a> Contraction<'a> {
             SweepQuestion { scene, standing_parts: &self.around, part: self.body, start, direction };
         let clear = straight_sweep_past(&question, termination, |_| Ok::<_, Interrupt>(false))?;
         let Some(Sweep::Clear { path, .. }) = clear else { return Ok(None) };
-        self.verified(&joined(&way, &path))
+        self.verified(&joined(&way, &path), self.leaving())
     }
 
     /// A verified way along some legs.
@@ -84,7 +84,7 @@ impl<'a> Contraction<'a> {
     /// # Errors
     /// The termination condition became true.
     pub(super) fn way(&self, legs: &[Vector3<f64>]) -> Result<Option<VerifiedPath>, Interrupt> {
-        self.verified(&self.along(legs))
+        self.verified(&self.along(legs), Leaving { aside: true, ..self.leaving() })
     }
 
     fn along(&self, legs: &[Vector3<f64>]) -> Vec<Pose> {
@@ -95,8 +95,10 @@ impl<'a> Contraction<'a> {
         way
     }
 
-    fn verified(&self, path: &[Pose]) -> Result<Option<VerifiedPath>, Interrupt> {
-        Ok(self.problem.checked_path(&self.around.standing, self.body, path)?.ok())
+    fn verified(&self, path: &[Pose], leaving: Leaving<'_, 'a>) -> Result<Option<VerifiedPath>, Interrupt> {
+        let checked = self.problem.checked_path(&self.around.standing, self.body, path)?;
+        let Ok(verified) = checked else { return Ok(None) };
+        Ok(leaving.with_clearance(&[], verified)?.ok())
     }
 
     /// The parts of the group.

@@ -23,7 +23,7 @@ use crate::tolerances::HULL_MARGIN;
 
 use super::blocked_actions::{few_of_each_part, of_inseparable};
 use super::inseparable::InseparablePairs;
-use super::outcome::{BlockedAction, Counters, Inseparable, Outcome, Reason, Removal};
+use super::outcome::{BlockedAction, Counters, Inseparable, NearPass, Outcome, Reason, Removal};
 use super::problem::{Checked, Observer, Problem, VerifiedPath};
 use super::release::Release;
 use super::request::Tried;
@@ -73,6 +73,27 @@ pub(super) enum Proof {
     Otherwise(Motion),
 }
 
+/// What refutes a way out.
+pub(super) enum RefutedWay {
+    /// Points that get too deep.
+    Enters(Vec<Penetration>),
+    /// A part that it passes too near.
+    TooNear(NearPass),
+}
+
+impl RefutedWay {
+    /// The parts that are in the way, ascending.
+    pub(super) fn parts(&self) -> Vec<usize> {
+        match self {
+            Self::Enters(penetrations) => entered(penetrations),
+            Self::TooNear(near) => vec![near.other],
+        }
+    }
+}
+
+/// A verified way out with the clearance that is wanted, or what refutes it.
+pub(super) type CheckedWay = Result<VerifiedPath, RefutedWay>;
+
 /// A sweep's claim that did not hold.
 pub(super) struct Refuted {
     /// Already the way to the sweep's start does not hold.
@@ -96,6 +117,8 @@ pub(super) struct Disassembly<'a, 'o> {
     hull_changes: usize,
     pub(super) removals: Vec<Removal>,
     pub(super) counters: Counters,
+    /// The ways out that were refused because they come too near to others.
+    near_passes: Vec<NearPass>,
     /// Whether some path was given up for lack of time: a search that finds nothing then proves nothing.
     pub(super) path_time_ran_out: bool,
 }
@@ -126,6 +149,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
             hull_changes: 0,
             removals: problem.earlier.clone(),
             counters: Counters::default(),
+            near_passes: Vec::new(),
             path_time_ran_out: false,
             problem,
         };
@@ -313,25 +337,25 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         motion: &[Pose],
     ) -> Result<Result<VerifiedPath, Refuted>, Stop> {
         let part = run.part;
-        let refuted = match self.checked(part, &joined(prefix, motion))? {
+        let refuted = match self.checked_way(part, &joined(prefix, motion))? {
             Ok(proof) => return Ok(Ok(proof)),
-            Err(penetrations) => penetrations,
+            Err(RefutedWay::TooNear(near)) => {
+                self.trace_refutation(run, vec![near.other]);
+                return Ok(Err(Refuted { prefix: false }));
+            }
+            Err(RefutedWay::Enters(penetrations)) => penetrations,
         };
         tracing::debug!(part, action = %run.action, over = refuted.first().map(|e| e.over), "sweep refuted");
-        self.trace_refutation(run, &refuted);
+        self.trace_refutation(run, entered(&refuted));
         self.problem.add_samples(part, &refuted);
         let prefix = prefix.len() > 1 && !self.holds(part, prefix)?;
         Ok(Err(Refuted { prefix }))
     }
 
-    /// Traces a refuted path. Returns the parts that it enters.
-    fn trace_refutation(&mut self, run: &Transition, penetrations: &[Penetration]) -> Vec<usize> {
-        let mut by: Vec<_> = penetrations.iter().map(|e| e.other).collect();
-        by.sort_unstable();
-        by.dedup();
+    /// Traces a path that some parts refute.
+    fn trace_refutation(&mut self, run: &Transition, by: Vec<usize>) {
         let (part, action) = (run.part, run.action.to_string());
-        self.trace(|| TraceEvent::Refuted { part, action, by: by.clone() });
-        by
+        self.trace(|| TraceEvent::Refuted { part, action, by });
     }
 
     /// Thins and verifies a motion that leads out from the end of `prefix`. A refuted one is
@@ -345,16 +369,21 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         let part = run.part;
         let mut motion = motion;
         for refinement in 0..=REFINEMENTS {
-            let refuted = match self.checked(part, &joined(prefix, &motion))? {
+            let refuted = match self.checked_way(part, &joined(prefix, &motion))? {
                 Ok(verified) => return Ok(Proof::Path(verified)),
-                Err(penetrations) => penetrations,
+                Err(RefutedWay::TooNear(near)) => {
+                    self.trace_refutation(&run, vec![near.other]);
+                    return Ok(Proof::Refuted { by: vec![near.other] });
+                }
+                Err(RefutedWay::Enters(penetrations)) => penetrations,
             };
             tracing::debug!(part, refinement, over = refuted.first().map(|e| e.over), "path refuted");
             self.problem.add_samples(part, &refuted);
             if prefix.len() > 1 && !self.holds(part, prefix)? {
                 return Ok(Proof::PrefixRefuted);
             }
-            let by = self.trace_refutation(&run, &refuted);
+            let by = entered(&refuted);
+            self.trace_refutation(&run, by.clone());
             if refinement == REFINEMENTS {
                 return Ok(Proof::Refuted { by });
             }
@@ -379,10 +408,31 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         self.timed(|problem| problem.checked_path(&standing, part, path))
     }
 
+    /// A check of a way out.
+    fn checked_way(&mut self, part: usize, path: &[Pose]) -> Result<CheckedWay, Stop> {
+        let checked = self.checked(part, path)?;
+        self.with_clearance(part, checked)
+    }
+
     /// The same for a path that is to be taken as it is.
-    pub(super) fn checked_as_given(&mut self, part: usize, path: &[Pose]) -> Result<Checked, Stop> {
+    pub(super) fn checked_way_as_given(&mut self, part: usize, path: &[Pose]) -> Result<CheckedWay, Stop> {
         let standing = self.standing(part);
-        self.timed(|problem| problem.checked_as_given(&standing, part, path))
+        let checked = self.timed(|problem| problem.checked_as_given(&standing, part, path))?;
+        self.with_clearance(part, checked)
+    }
+
+    fn with_clearance(&mut self, part: usize, checked: Checked) -> Result<CheckedWay, Stop> {
+        let verified = match checked {
+            Ok(verified) if self.problem.clearance > 0.0 => verified,
+            checked => return Ok(checked.map_err(RefutedWay::Enters)),
+        };
+        let (started, around) = (Instant::now(), self.surroundings(part));
+        let leaving = Leaving { problem: &self.problem, body: part, around: &around, aside: false };
+        let checked = leaving.with_clearance(&self.removals, verified);
+        self.count_verification(started);
+        let checked = checked?;
+        self.near_passes.extend(checked.as_ref().err());
+        Ok(checked.map_err(RefutedWay::TooNear))
     }
 
     /// A check of a path; its time is verification.
@@ -537,7 +587,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
                     blocked.extend(proved);
                     (PlanStatus::Infeasible, Some(Reason::Inseparable(pair)))
                 }
-                None => (PlanStatus::Exhausted, Some(Reason::Exhausted)),
+                None => (PlanStatus::Exhausted, Some(self.nothing_found(&remaining))),
             }),
             Some(Stop::Interrupted(interrupt)) => Err(interrupt),
             Some(Stop::Budget(n)) => {
@@ -565,6 +615,14 @@ impl<'a, 'o> Disassembly<'a, 'o> {
             base,
             counters: self.counters,
         }
+    }
+
+    /// Why a search is exhausted.
+    fn nothing_found(&self, remaining: &[usize]) -> Reason {
+        let wanted = self.problem.wanted(remaining);
+        let here = |near: &&NearPass| wanted.contains(&near.part) && remaining.contains(&near.other);
+        let nearest = NearPass::best(self.near_passes.iter().filter(here).copied());
+        nearest.map_or(Reason::Exhausted, Reason::TooNear)
     }
 
     /// A pair that never comes apart and of which one is wanted. What was not looked for yet is, the cheaper proof
@@ -597,6 +655,12 @@ pub(super) fn interrupted(interrupt: Interrupt) -> (PlanStatus, Option<Reason>) 
         Interrupt::Cancelled => limit(PlanStatus::Cancelled, "cancelled"),
         Interrupt::DeadlinePassed => limit(PlanStatus::Timeout, "the deadline passed"),
     }
+}
+
+/// The parts that refute a path, ascending.
+fn entered(penetrations: &[Penetration]) -> Vec<usize> {
+    let by: BTreeSet<usize> = penetrations.iter().map(|e| e.other).collect();
+    by.into_iter().collect()
 }
 
 /// A path continued by a motion that starts at its end.

@@ -17,6 +17,7 @@ mod blocked_actions;
 mod carried_groups;
 mod cell_decomposition;
 mod cell_memory;
+mod clearance;
 mod contraction;
 mod critical_places;
 mod critical_turns;
@@ -75,7 +76,9 @@ use deferred_removals::DeferredRemovals;
 pub use crate::termination::{Interrupt, Termination};
 pub use directions::axes_of;
 pub use initial_analysis::initial_graphs;
-pub use outcome::{BlockedAction, Counters, Inseparable, Outcome, Reason, Removal, SeparationProof};
+pub use outcome::{
+    BlockedAction, Counters, Inseparable, NearPass, Outcome, Reason, Removal, SeparationProof,
+};
 pub use preferred::PreferredGroups;
 pub use problem::{Checked, Effort, Observer, Problem, VerifiedPath};
 pub use release::Release;

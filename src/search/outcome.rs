@@ -90,8 +90,38 @@ pub struct Inseparable {
     pub proof: SeparationProof,
 }
 
+/// A part that comes nearer to another on its way than is wanted. Lengths are in the planning frame.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct NearPass {
+    /// The part that moves.
+    pub part: usize,
+    /// The part that it passes.
+    pub other: usize,
+    /// How near they come.
+    pub distance: f64,
+    /// How far they should be apart.
+    pub kept: f64,
+}
+
+impl NearPass {
+    /// How much of the distance is there.
+    fn share(&self) -> f64 {
+        self.distance / self.kept
+    }
+
+    /// The one of some passes that is the furthest from what is wanted.
+    pub(super) fn worst(passes: impl IntoIterator<Item = Self>) -> Option<Self> {
+        passes.into_iter().min_by(|a, b| a.share().total_cmp(&b.share()))
+    }
+
+    /// Of the nearest passes of some ways of some parts, the one that is the closest to what is wanted.
+    pub(super) fn best(passes: impl IntoIterator<Item = Self>) -> Option<Self> {
+        passes.into_iter().max_by(|a, b| a.share().total_cmp(&b.share()))
+    }
+}
+
 /// Why a search is not complete.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reason {
     /// A limit ended it, in words.
@@ -100,6 +130,8 @@ pub enum Reason {
     Inseparable(Inseparable),
     /// Nothing more was found, and nothing was proved.
     Exhausted,
+    /// The same; and a way out was refused because it comes too near to another part.
+    TooNear(NearPass),
 }
 
 impl Reason {
@@ -113,6 +145,15 @@ impl Reason {
                     "{}. The search found no further motion that takes one of them out, and no proof that there is \
                      none.",
                     remain(remaining, &name)
+                );
+            }
+            Self::TooNear(near) => {
+                return format!(
+                    "{}. On the widest way out of {} that was found, it keeps {:.0} % of the wanted distance from {}.",
+                    remain(remaining, &name),
+                    name(near.part),
+                    near.share() * 100.0,
+                    name(near.other)
                 );
             }
             Self::Inseparable(pair) => *pair,

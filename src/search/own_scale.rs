@@ -44,7 +44,8 @@ pub(super) fn searched_at(
     let scaled = Problem {
         scene: own.scene.clone(),
         verifier: &verifier,
-        clearance: problem.clearance.map(|gap| gap * factor),
+        end_gap: problem.end_gap.map(|gap| gap * factor),
+        clearance: problem.clearance * factor,
         verdicts: Arc::default(),
         extra_points: HashMap::new(),
         ..problem.clone()

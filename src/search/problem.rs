@@ -79,6 +79,8 @@ pub struct Problem<'a> {
     pub base: Base,
     /// Parts that are not asked for, and stay unless others cannot leave otherwise.
     pub keep: Vec<usize>,
+    /// Those of the parts that may not move that are only in the way: no base, and no part that is left.
+    pub keep_out: Vec<usize>,
     /// Whether this search may take parts off that are to be kept.
     pub releases_kept: bool,
     /// What may leave now beside the parts that are asked for.
@@ -99,7 +101,9 @@ pub struct Problem<'a> {
     /// Whether parts that leave straight, or are apart already, are taken out without simulation.
     pub sweeps: bool,
     /// The gap between the hulls where a part's way out ends; `None` for the usual share of the part.
-    pub clearance: Option<f64>,
+    pub end_gap: Option<f64>,
+    /// The distance that parts keep from what they pass on their way; 0 for none.
+    pub clearance: f64,
     /// The direction up; `None` for the one in which most parts can go at first.
     pub up: Option<Vector3<f64>>,
     /// What random poses depend on.
@@ -228,10 +232,12 @@ impl Problem<'_> {
         self.keep.iter().copied().filter(is_off).collect()
     }
 
-    /// Whether nothing more has to come out: a last part alone is apart from all others.
+    /// Whether nothing more has to come out: a last part alone is apart from all others. It may stay among what is only in the
+    /// way, unless it is asked for.
     #[must_use]
     pub fn is_goal(&self, remaining: &[usize]) -> bool {
-        remaining.len() <= 1 || self.wanted(remaining).is_empty()
+        let left = remaining.iter().filter(|part| self.targets.is_some() || !self.keep_out.contains(part));
+        left.count() <= 1 || self.wanted(remaining).is_empty()
     }
 
     /// Thins a path and verifies it on the triangles. A path off a thread is tried in the middle of the
@@ -277,7 +283,7 @@ impl Problem<'_> {
 
     /// Those of the standing parts that a path may meet.
     pub(super) fn near(&self, standing: &[usize], part: usize, path: &[Pose]) -> Vec<usize> {
-        let swept = self.scene.swept_bounds(part, path).grown(self.verifier.limit());
+        let swept = self.scene.swept_bounds(part, path).grown(self.verifier.limit().max(self.clearance));
         self.scene.broad_phase.meeting_of(standing, &swept)
     }
 
@@ -297,7 +303,7 @@ impl Problem<'_> {
         Ok(Verdict::of_all(past.collect::<Result<_, _>>()?))
     }
 
-    /// How deep a path gets past each of some parts that it may meet; `None` where it is refused.
+    /// How deep a path gets past each of some parts that it may meet; `None` where it is refused, or comes too near.
     ///
     /// # Errors
     /// The termination condition became true.
@@ -320,7 +326,8 @@ impl Problem<'_> {
                 }
                 deepest = deepest.max(verdict.depth);
             }
-            Ok((other, Some(deepest)))
+            let is_near = self.passes_too_near([part, other], path)?;
+            Ok((other, (!is_near).then_some(deepest)))
         };
         self.near(others, part, path).par_iter().map(depth).collect()
     }

@@ -151,7 +151,10 @@ pub struct PlanRequest {
     pub sweeps: Option<bool>,
     /// The gap between a part's hull and that of the rest where its path out ends, in the input's units, at least 0;
     /// `None` for a hundredth of the longest side of the part's box.
-    pub clearance: Option<f64>,
+    pub end_gap: Option<f64>,
+    /// The distance that parts keep from what they pass on their way, in the input's units, at least 0. Pairs that are nearer
+    /// as they stand keep what they have; those that touch as they stand may touch.
+    pub clearance: f64,
     /// The direction up, in the input's frame, of any length but 0: upward paths come before sideways ones, and these
     /// before downward ones. `None` for the direction in which most parts can go at first.
     pub up: Option<[f64; 3]>,
@@ -178,6 +181,9 @@ pub struct PlanRequest {
     pub base: Vec<usize>,
     /// Parts that stay unless others that are asked for cannot leave otherwise. They are not asked for.
     pub keep: Vec<usize>,
+    /// Parts that are in the way and do not come apart, as a fixture or a table: they may not move, and are no base.
+    /// In the plan they are among those that may not move.
+    pub keep_out: Vec<usize>,
     /// Groups that should leave as wholes, to be taken apart afterwards. A part may be in several groups if these are
     /// nested. Only SBDP* with the extended actions supports them.
     pub groups: Vec<Vec<usize>>,

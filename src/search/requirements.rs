@@ -82,8 +82,8 @@ impl Leaving<'_, '_> {
     /// A path that ends apart from the hull of all that stands, continued until that is as far away as asked for, and until
     /// it is apart from all that was there at the start. It goes on as it came, or straight away from the hull where it
     /// came along it. On both ways, nothing of the hull is met.
-    fn led_out(self, earlier: &[Removal], mut path: Vec<Pose>) -> Vec<Pose> {
-        let Self { problem: Problem { scene, clearance, .. }, body, around, .. } = self;
+    pub(super) fn led_out(self, earlier: &[Removal], mut path: Vec<Pose>) -> Vec<Pose> {
+        let Self { problem: Problem { scene, end_gap, clearance, .. }, body, around, .. } = self;
         let Some(&end) = path.last() else { return path };
         let last = last_leg(&path);
         // It points to where the others lie.
@@ -91,15 +91,17 @@ impl Leaving<'_, '_> {
             return path;
         };
         let away = -towards;
-        let along = last.filter(|d| d.dot(&away) >= ALONG_HULL).unwrap_or(away);
+        // Straight away from the hull, the part comes nearer to nothing.
+        let straight = last.filter(|d| *clearance == 0.0 && d.dot(&away) >= ALONG_HULL);
+        let along = straight.unwrap_or(away);
         let hull = transformed(&scene.bodies[body].shape.hull, &end);
         let gap = gap_along(&towards, &hull, &around.hull);
-        let clearance =
-            clearance.unwrap_or_else(|| HULL_CLEARANCE * scene.bodies[body].bounds.extents().amax());
+        let usual = || HULL_CLEARANCE * scene.bodies[body].bounds.extents().amax();
+        let end_gap = end_gap.unwrap_or_else(usual).max(*clearance);
         let near = hull.iter().map(|p| p.coords.dot(&along)).fold(f64::INFINITY, f64::min);
         let gone = earlier.iter().flat_map(|r| &r.parts).map(|&p| scene.bodies[p].bounds.support(&along));
         let past_gone = gone.fold(f64::NEG_INFINITY, f64::max) + HULL_MARGIN - near;
-        let further = past_gone.max((clearance - gap) / along.dot(&away));
+        let further = past_gone.max((end_gap - gap) / along.dot(&away));
         if further > 0.0 {
             if last == Some(along) {
                 path.pop();

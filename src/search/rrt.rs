@@ -171,7 +171,7 @@ impl RrtSearch<'_, '_> {
         }
         if let Some(node) = out {
             if let Ok(VerifiedPath { path, depth }) =
-                self.disassembly.checked_as_given(part, &tree.path_to(node))?
+                self.disassembly.checked_way_as_given(part, &tree.path_to(node))?
             {
                 self.disassembly.remove(part, path, depth)?;
                 return Ok(true);

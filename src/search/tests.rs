@@ -31,7 +31,8 @@ impl Observer for Recorder {
 
 pub(super) fn problem(scene: Scene, verifier: &Verifier) -> Problem<'_> {
     Problem {
-        clearance: None,
+        end_gap: None,
+        clearance: 0.0,
         preferred: PreferredGroups::default(),
         up: None,
         seed: 0,
@@ -42,6 +43,7 @@ pub(super) fn problem(scene: Scene, verifier: &Verifier) -> Problem<'_> {
         fixed: Vec::new(),
         base: Base::default(),
         keep: Vec::new(),
+        keep_out: Vec::new(),
         releases_kept: false,
         released: Release::Nothing,
         targets: None,
@@ -450,8 +452,8 @@ fn a_way_up_comes_first_wherever_up_is_said_to_be() {
 
 #[test]
 fn ways_end_as_far_off_as_asked_for() {
-    let gap = |clearance: Option<f64>| {
-        let outcome = planned(stack(), |p| Problem { clearance, ..p });
+    let gap = |end_gap: Option<f64>| {
+        let outcome = planned(stack(), |p| Problem { end_gap, ..p });
         outcome.removals[0].motion().translation.vector.norm()
     };
     assert!((gap(Some(0.5)) - 0.5).abs() < 1e-9 && (gap(Some(0.0)) - HULL_MARGIN).abs() < HULL_MARGIN);

@@ -77,9 +77,9 @@ pub(super) fn unscrewed(
             met.extend(scene.broad_phase.meeting_of(&surroundings.standing, &swept));
             continue;
         }
-        match disassembly.checked_as_given(part, &path)? {
+        match disassembly.checked_way_as_given(part, &path)? {
             Ok(verified) => return Ok(Ok(Unscrewed { verified, action: action_along(&way) })),
-            Err(refuted) => met.extend(refuted.iter().map(|penetration| penetration.other)),
+            Err(refuted) => met.extend(refuted.parts()),
         }
     }
     Ok(Err(met))

@@ -3,10 +3,9 @@
 use nalgebra::Point3;
 use rayon::prelude::*;
 
-use crate::contact::{ClosestApproach, PassedPair, closest_approach};
-use crate::geometry::{Assembly, Bounds, Pose, Shape, scaled_pose};
+use crate::contact::{ClosestApproach, PassedPair, PassingPair, closest_approach};
+use crate::geometry::{Assembly, Bounds, Pose, scaled_pose};
 use crate::termination::{Interrupt, Termination};
-use crate::tolerances::{APPROACH_PRECISION, ASSEMBLED_CONTACT};
 
 /// A step whose clearance is asked for. All motions are rigid and in the input's frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -73,42 +72,18 @@ pub(super) fn answer(
     query.steps.par_iter().map(of_step).collect()
 }
 
-/// A moving and a standing part.
-struct PassingPair<'a> {
-    parts: [usize; 2],
-    /// Where the standing shape stands, in the planning frame.
-    standing: Pose,
-    passed: PassedPair<'a>,
-    /// The same before it moves.
-    begin: PassedPair<'a>,
-}
-
-impl PassingPair<'_> {
-    /// The distance from which on the two do not touch as they stand.
-    fn contact(&self) -> f64 {
-        let size = |shape: &Shape| shape.bounds().extents().max();
-        let [a, b] = self.passed.shapes.map(size);
-        ASSEMBLED_CONTACT * a.min(b)
-    }
-
-    /// How far the two are apart as they stand, if less than `reach`.
-    fn assembled(&self, reach: f64, termination: &Termination) -> Result<Option<f64>, Interrupt> {
-        let found = closest_approach(std::slice::from_ref(&self.begin), reach, termination)?;
-        Ok(found.map(|found| found.distance))
-    }
-
-    fn described(&self, found: &ClosestApproach, assembled: f64, scale: f64) -> PartClearance {
-        let [moving, standing] = self.parts;
-        PartClearance {
-            moving,
-            standing,
-            distance: found.distance / scale,
-            at_least: found.at_least / scale,
-            assembled: assembled / scale,
-            segment: found.segment,
-            share: found.share,
-            points: found.points.map(|points| points.map(|p| self.standing * p / scale)),
-        }
+/// A pair that comes near, in the input's units.
+fn described(pair: &PassingPair<'_>, found: &ClosestApproach, assembled: f64, scale: f64) -> PartClearance {
+    let [moving, standing] = pair.parts;
+    PartClearance {
+        moving,
+        standing,
+        distance: found.distance / scale,
+        at_least: found.at_least / scale,
+        assembled: assembled / scale,
+        segment: found.segment,
+        share: found.share,
+        points: found.points.map(|points| points.map(|p| pair.in_planning_frame(&p) / scale)),
     }
 }
 
@@ -122,31 +97,25 @@ fn step_clearance(
     let mut free = Vec::new();
     let mut touching = Vec::new();
     for pair in pairs(assembly, step) {
-        match pair.assembled(pair.contact(), termination)? {
-            Some(_) => touching.push(pair.parts[1]),
-            None => free.push(pair),
+        if pair.touches(termination)? {
+            touching.push(pair.parts[1]);
+        } else {
+            free.push(pair);
         }
     }
     touching.sort_unstable();
     touching.dedup();
     let passed: Vec<PassedPair<'_>> = free.iter().map(|pair| pair.passed.clone()).collect();
+    let assembled =
+        |pair: &PassingPair<'_>| Ok(pair.assembled(f64::INFINITY, termination)?.unwrap_or(f64::INFINITY));
     let closest = closest_approach(&passed, f64::INFINITY, termination)?;
     let closest = closest.map(|found| (&free[found.pair], found));
-    let closest = closest.map(|(pair, found)| {
-        let assembled = pair.assembled(f64::INFINITY, termination)?.unwrap_or(f64::INFINITY);
-        Ok(pair.described(&found, assembled, scale))
-    });
+    let closest = closest.map(|(pair, found)| Ok(described(pair, &found, assembled(pair)?, scale)));
     let mut short = Vec::new();
     for (pair, wanted) in free.iter().filter_map(|pair| Some((pair, wanted? * scale))) {
-        let alone = std::slice::from_ref(&pair.passed);
-        let Some(found) = closest_approach(alone, wanted, termination)? else { continue };
-        let assembled = pair.assembled(f64::INFINITY, termination)?.unwrap_or(f64::INFINITY);
-        let kept = wanted.min(assembled);
-        // The bound is below the distance by the precision, and the distance off by it where they turn.
-        let is_kept = found.distance >= kept * (1.0 - APPROACH_PRECISION)
-            && found.at_least >= kept * (1.0 - 2.0 * APPROACH_PRECISION);
-        if !is_kept {
-            short.push(pair.described(&found, assembled, scale));
+        let Some(kept) = pair.kept(wanted, termination)? else { continue };
+        if let Some(found) = pair.too_near(kept, termination)? {
+            short.push(described(pair, &found, assembled(pair)?, scale));
         }
     }
     short.sort_by(|a, b| a.distance.total_cmp(&b.distance));
@@ -179,7 +148,7 @@ fn pairs<'a>(assembly: &'a Assembly, step: &PassingStep) -> Vec<PassingPair<'a>>
                 path: path.iter().map(|motion| into * motion * from_m).collect(),
                 centre,
             },
-            begin: PassedPair { shapes, path: vec![into * from_m], centre },
+            stand: PassedPair { shapes, path: vec![into * from_m], centre },
         }
     };
     moving.iter().flat_map(|m| standing.iter().map(|s| pair(*m, *s))).collect()

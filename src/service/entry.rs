@@ -13,7 +13,7 @@ use crate::geometry::{Assembly, Shape};
 use crate::plan::{Base, OVERLAP, Plan, PlanStatus, VERDICT, Verifier};
 use crate::scene::{HullTree, JoinedHulls};
 use crate::search::{
-    Effort, Engine, Observer, PlanRequest, PlanSink, PreferredGroups, Problem, Release, SteadyOrder,
+    Effort, Engine, Observer, PlanRequest, PlanSink, PreferredGroups, Problem, Release, Staging, SteadyOrder,
     TraceEvent, initial_graphs, search,
 };
 use crate::simulation::{
@@ -54,9 +54,18 @@ pub fn check_gravity(up: [f64; 3], friction: f64) -> Result<(), ServiceError> {
     check_direction("gravity", up)
 }
 
+/// What the wanted clearance of an assembly plan does not cover.
+fn clearance_note(request: &PlanRequest) -> Option<String> {
+    let waits = matches!(request.assembly, Some(Staging::Beside(_)));
+    let words =
+        "parts keep the clearance where they are put in, and not on their way there from where they wait";
+    (waits && request.clearance > 0.0).then(|| words.to_owned())
+}
+
 /// Refuses values of a request that are none.
 fn check_values(request: &PlanRequest) -> Result<(), ServiceError> {
-    check_length("clearance", request.clearance)?;
+    check_length("end_gap", request.end_gap)?;
+    check_length("clearance", Some(request.clearance))?;
     request.up.map_or(Ok(()), |up| check_direction("up", up))?;
     if let Some(SteadyOrder { up, friction, .. }) = request.steady {
         check_gravity(up, friction)?;
@@ -115,7 +124,8 @@ impl Entry {
         let termination = limited.as_ref().unwrap_or(termination);
         let mut fixed = request.fixed.clone();
         fixed.extend(&self.assembly.fixed);
-        let PlanRequest { mut removed, mut base, mut keep, .. } = request.clone();
+        let PlanRequest { mut removed, mut base, mut keep, keep_out, .. } = request.clone();
+        fixed.extend(&keep_out);
         for list in [&mut fixed, &mut removed, &mut base, &mut keep] {
             list.sort_unstable();
             list.dedup();
@@ -124,8 +134,8 @@ impl Entry {
             list.retain(|p| removed.binary_search(p).is_err());
         }
         check_values(request)?;
-        for (field, list) in [("fixed", &fixed), ("base", &base), ("keep", &keep)] {
-            if let Some(&part) = request.targets.iter().flatten().find(|&p| list.binary_search(p).is_ok()) {
+        for (field, list) in [("keep_out", &keep_out), ("fixed", &fixed), ("base", &base), ("keep", &keep)] {
+            if let Some(&part) = request.targets.iter().flatten().find(|p| list.contains(p)) {
                 let name = self.assembly.parts[part].name.clone();
                 return Err(ServiceError::TargetStays { name, field });
             }
@@ -143,6 +153,8 @@ impl Entry {
             overlaps: Vec::new(),
             notes: Vec::new(),
         };
+        let mut frame = frame;
+        frame.notes.extend(clearance_note(request));
         let PlanFrame { fixed, removed, base, keep, .. } = &frame;
         let [fixed, removed, base, keep] = [fixed, removed, base, keep].map(Vec::clone);
         let assembly = &self.assembly;
@@ -327,6 +339,7 @@ impl Entry {
             fixed: fixed.to_vec(),
             base: Base { parts: base.to_vec(), reason: None },
             keep: keep.to_vec(),
+            keep_out: request.keep_out.clone(),
             releases_kept: false,
             released: Release::Nothing,
             preferred: PreferredGroups::new(&request.groups),
@@ -337,7 +350,8 @@ impl Entry {
             actions: request.actions,
             static_analysis: request.static_analysis,
             sweeps: request.sweeps(),
-            clearance: request.clearance.map(|length| length * self.assembly.scale),
+            end_gap: request.end_gap.map(|length| length * self.assembly.scale),
+            clearance: request.clearance * self.assembly.scale,
             seed: request.seed,
             max_simulations: request.max_simulations,
             earlier: Vec::new(),

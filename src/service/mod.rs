@@ -570,8 +570,8 @@ impl Drop for Service {
 /// Parts that a request or a revision names, by field.
 type Named = [(&'static str, Vec<usize>)];
 
-fn named_parts(request: &PlanRequest) -> [(&'static str, Vec<usize>); 7] {
-    let PlanRequest { fixed, removed, targets, base, keep, groups, assembly, .. } = request;
+fn named_parts(request: &PlanRequest) -> [(&'static str, Vec<usize>); 8] {
+    let PlanRequest { fixed, removed, targets, base, keep, keep_out, groups, assembly, .. } = request;
     let staged = match assembly {
         Some(Staging::Beside(given)) => given.iter().map(|(part, _)| *part).collect(),
         _ => Vec::new(),
@@ -583,6 +583,7 @@ fn named_parts(request: &PlanRequest) -> [(&'static str, Vec<usize>); 7] {
         ("targets", targets),
         ("base", base.clone()),
         ("keep", keep.clone()),
+        ("keep_out", keep_out.clone()),
         ("groups", groups.concat()),
         ("staged", staged),
     ]

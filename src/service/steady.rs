@@ -4,9 +4,9 @@ use std::collections::HashSet;
 
 use nalgebra::{Unit, Vector3};
 
-use super::statics::{StandingSession, StandingState, StaticsQuery, is_screwed_off};
+use super::statics::{StandingSession, StandingState, StaticsQuery, answer, is_screwed_off};
 use crate::budgets::STEADY_STATES;
-use crate::geometry::{Assembly, Pose};
+use crate::geometry::{Assembly, Pose, scaled_pose};
 use crate::plan::PlanStatus;
 use crate::scene::{Scene, StandingParts, exit_direction};
 use crate::search::{Outcome, Reason, Removal, SteadyOrder};
@@ -55,12 +55,6 @@ impl Standing<'_> {
         termination: &Termination,
     ) -> Option<String> {
         let Self { assembly, scene, present, fixed } = *self;
-        if outcome.removals.iter().any(|removal| removal.aside) {
-            return Some(
-                "the steps are in the order of the search, whatever has to be held: parts are moved aside"
-                    .to_owned(),
-            );
-        }
         let stays: Vec<usize> = match [fixed, &outcome.base.parts].concat() {
             stays if stays.is_empty() => outcome.remaining.clone(),
             stays => stays,
@@ -88,8 +82,21 @@ impl Standing<'_> {
                 .collect(),
             ..StaticsQuery::default()
         };
-        let ordered = ordered(&outcome.removals);
         let limit = wanted.hands.map(|hands| hands.get() as usize);
+        if outcome.removals.iter().any(|removal| removal.aside) {
+            let short = limit.map(|limit| self.first_short(query, &outcome.removals, limit, termination));
+            match short.unwrap_or(Ok(None)) {
+                Ok(None) => {}
+                Ok(Some(short)) => {
+                    let order: Vec<usize> = (0..short.next.unwrap_or(0)).collect();
+                    end_early(assembly, outcome, &order, limit.unwrap_or_default(), &short);
+                }
+                Err(interrupt) => end_interrupted(outcome, interrupt),
+            }
+            let words = "the steps are in the order of the search, and no other was looked for: parts are moved aside";
+            return Some(words.to_owned());
+        }
+        let ordered = ordered(&outcome.removals);
         let found = StandingSession::new(assembly, scene, &query, termination).and_then(|mut session| {
             let stability = |standing: &[usize]| session.stability(standing);
             let is_out = |standing: &[usize], part, pose: &Pose| is_out(scene, standing, part, pose);
@@ -102,20 +109,60 @@ impl Standing<'_> {
             Ok((order, short)) => {
                 if let Some(short) = short {
                     end_early(assembly, outcome, &order, limit.unwrap_or_default(), &short);
+                } else {
+                    outcome.removals = reordered(&outcome.removals, &order);
                 }
-                outcome.removals = reordered(&outcome.removals, &order);
             }
-            Err(interrupt) => {
-                outcome.status = match interrupt {
-                    Interrupt::Cancelled => PlanStatus::Cancelled,
-                    Interrupt::DeadlinePassed => PlanStatus::Timeout,
-                };
-                let words = "the time was over before an order was found in which few parts have to be held";
-                outcome.reason = Some(Reason::Limit(words.to_owned()));
-            }
+            Err(interrupt) => end_interrupted(outcome, interrupt),
         }
         None
     }
+
+    /// The first of some removals, as they are ordered, that needs more hands than there are. `query` is about what stands
+    /// before them.
+    fn first_short(
+        &self,
+        query: StaticsQuery,
+        removals: &[Removal],
+        limit: usize,
+        termination: &Termination,
+    ) -> Result<Option<ShortOfHands>, Interrupt> {
+        let to_input = 1.0 / self.assembly.scale;
+        let first = query.states[0].clone();
+        // Each state, with the removal that leads to it and the hands that move something meanwhile.
+        let mut uses: Vec<(Option<usize>, usize)> = vec![(None, 0)];
+        let mut states = vec![first];
+        for (i, removal) in removals.iter().enumerate().filter(|(_, removal)| removal.of.is_none()) {
+            let before = &states[states.len() - 1];
+            let (moving, rest): (Vec<_>, Vec<_>) =
+                before.parts.iter().copied().partition(|(part, _)| removal.parts.contains(part));
+            let rest = StandingState { parts: rest, stays: before.stays.clone() };
+            states.push(rest.clone());
+            uses.push((Some(i), 1));
+            if removal.aside {
+                let motion = scaled_pose(&removal.motion(), to_input);
+                let mut after = rest;
+                after.parts.extend(moving.iter().map(|(part, pose)| (*part, motion * pose)));
+                after.parts.sort_by_key(|(part, _)| *part);
+                states.push(after);
+                uses.push((Some(i), 0));
+            }
+        }
+        let found = answer(self.assembly, self.scene, &StaticsQuery { states, ..query }, termination)?;
+        let short =
+            uses.into_iter().zip(&found.states).find(|((_, moving), state)| state.trouble() + moving > limit);
+        Ok(short.map(|((next, _), state)| ShortOfHands { next, held: held(state) }))
+    }
+}
+
+/// Ends an outcome whose order was not found in time.
+fn end_interrupted(outcome: &mut Outcome, interrupt: Interrupt) {
+    outcome.status = match interrupt {
+        Interrupt::Cancelled => PlanStatus::Cancelled,
+        Interrupt::DeadlinePassed => PlanStatus::Timeout,
+    };
+    let words = "the time was over before an order was found in which few parts have to be held";
+    outcome.reason = Some(Reason::Limit(words.to_owned()));
 }
 
 /// Which removal has to come after which.
@@ -169,7 +216,9 @@ fn end_early(
     let left: Vec<&Removal> = left.map(|number| &outcome.removals[number]).collect();
     let stay = left.iter().filter(|removal| removal.of.is_none()).flat_map(|removal| &removal.parts);
     outcome.remaining.extend(stay.copied().collect::<Vec<usize>>());
+    // What is moved aside stays, too.
     outcome.remaining.sort_unstable();
+    outcome.remaining.dedup();
     outcome.unfinished = outcome.remaining.clone();
     let names = |parts: &[usize]| {
         let names: Vec<&str> = parts.iter().map(|&part| assembly.parts[part].name.as_str()).collect();
@@ -180,12 +229,13 @@ fn end_early(
     let reason = match short.next {
         None => format!("As the parts stand, {hands} cannot hold them: {held}."),
         Some(next) => format!(
-            "No order was found that {hands} can carry out. Where the longest one ends, the step that needs the fewest takes off \
-             {}: 1 to move it, and {held}.",
+            "No order was found that {hands} can carry out. Where the longest one ends, the step that needs the fewest moves \
+             {}: 1 for that, and {held}.",
             names(&outcome.removals[next].parts)
         ),
     };
     (outcome.status, outcome.reason) = (PlanStatus::Exhausted, Some(Reason::Limit(reason)));
+    outcome.removals = reordered(&outcome.removals, order);
 }
 
 /// A search for the order, depth first.

@@ -177,9 +177,9 @@ struct PlanOptions {
     std::uint64_t seed = 0;
     std::optional<Nanoseconds> timeout, planning_timeout, path_timeout;
     std::optional<std::uint64_t> max_simulations;
-    std::optional<double> clearance;
+    std::optional<double> end_gap;
     std::optional<std::array<double, 3>> up;
-    std::vector<std::uint32_t> fixed, removed, base, keep;
+    std::vector<std::uint32_t> fixed, removed, base, keep, keep_out;
     std::optional<std::vector<std::uint32_t>> targets;
     std::vector<std::vector<std::uint32_t>> groups;
     std::vector<SbdpMovedPart> moved, staged;
@@ -191,6 +191,8 @@ struct PlanOptions {
     std::uint32_t hands = 0;
     std::optional<double> friction;
     std::optional<std::array<double, 3>> against_gravity;
+    // The distance that parts keep from what they pass, unless they are nearer as they stand.
+    double clearance = 0;
 };
 
 namespace detail {
@@ -220,7 +222,7 @@ template <class F> auto with_options(const PlanOptions &o, F use) {
     c.planning_timeout_ns = planning_timeout.get();
     c.path_timeout_ns = path_timeout.get();
     c.max_simulations = o.max_simulations ? &*o.max_simulations : nullptr;
-    c.clearance = o.clearance ? &*o.clearance : nullptr;
+    c.end_gap = o.end_gap ? &*o.end_gap : nullptr;
     c.up = o.up ? o.up->data() : nullptr;
     c.fixed = o.fixed.data(), c.fixed_count = o.fixed.size();
     c.removed = o.removed.data(), c.removed_count = o.removed.size();
@@ -230,6 +232,7 @@ template <class F> auto with_options(const PlanOptions &o, F use) {
     }
     c.base = o.base.data(), c.base_count = o.base.size();
     c.keep = o.keep.data(), c.keep_count = o.keep.size();
+    c.keep_out = o.keep_out.data(), c.keep_out_count = o.keep_out.size();
     c.groups = groups.data(), c.group_count = groups.size();
     c.moved = o.moved.data(), c.moved_count = o.moved.size();
     c.staged = o.staged.data(), c.staged_count = o.staged.size();
@@ -239,6 +242,7 @@ template <class F> auto with_options(const PlanOptions &o, F use) {
     c.hands = o.hands;
     c.friction = o.friction ? &*o.friction : nullptr;
     c.against_gravity = o.against_gravity ? o.against_gravity->data() : nullptr;
+    c.clearance = o.clearance;
     return use(&c);
 }
 

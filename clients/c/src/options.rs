@@ -174,7 +174,7 @@ pub struct SbdpPlanOptions {
     /// Simulations after which to give up; null for no limit.
     pub max_simulations: *const u64,
     /// The gap with which a path out ends, in the input's units; null for a hundredth of the part's longest side.
-    pub clearance: *const f64,
+    pub end_gap: *const f64,
     /// The direction up, three numbers, of any length but 0; null for the one in which most parts can go at first.
     pub up: *const f64,
     /// Parts that may not move.
@@ -227,6 +227,13 @@ pub struct SbdpPlanOptions {
     /// With `SBDP_REPORT_STABILITY` or `steady`: the direction against gravity, three numbers, of any length but 0; null for `up`, and
     /// without that for +z.
     pub against_gravity: *const f64,
+    /// Parts that are in the way and do not come apart, as a fixture or a table: they may not move, and are no base.
+    pub keep_out: *const u32,
+    /// How many.
+    pub keep_out_count: usize,
+    /// The distance that parts keep from what they pass on their way, in the input's units, at least 0. Pairs that are nearer as
+    /// they stand keep what they have; those that touch as they stand may touch.
+    pub clearance: f64,
 }
 
 // SAFETY: it begins with its size, and has but numbers and pointers.
@@ -263,7 +270,8 @@ pub(crate) unsafe fn read_plan_options(options: *const SbdpPlanOptions) -> Resul
             planning_timeout: time(given.planning_timeout_ns, "options->planning_timeout_ns")?,
             path_timeout: time(given.path_timeout_ns, "options->path_timeout_ns")?,
             seed: given.seed,
-            clearance: optional(given.clearance, "options->clearance")?,
+            end_gap: optional(given.end_gap, "options->end_gap")?,
+            clearance: given.clearance,
             up: optional(given.up.cast(), "options->up")?,
             max_simulations: optional(given.max_simulations, "options->max_simulations")?,
             threads: given.threads,
@@ -275,6 +283,7 @@ pub(crate) unsafe fn read_plan_options(options: *const SbdpPlanOptions) -> Resul
             },
             base: list(given.base, given.base_count, "options->base")?,
             keep: list(given.keep, given.keep_count, "options->keep")?,
+            keep_out: list(given.keep_out, given.keep_out_count, "options->keep_out")?,
             groups: array(given.groups, given.group_count, "options->groups")?
                 .iter()
                 .map(|group| list(group.parts, group.part_count, "options->groups[].parts"))

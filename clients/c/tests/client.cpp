@@ -54,7 +54,8 @@ int main(int count, char **arguments) {
     sbdp::PlanOptions chosen;
     chosen.fixed = {0};
     chosen.up = {0.0, 0.0, 1.0};
-    chosen.clearance = 0.5;
+    chosen.end_gap = 0.5;
+    chosen.clearance = 0.25;
     chosen.timeout = std::chrono::seconds(60);
     chosen.targets = std::vector<std::uint32_t>{1};
     const sbdp::Plan upwards = client.plan(handle, chosen).to_end();

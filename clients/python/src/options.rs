@@ -169,6 +169,7 @@ pub(crate) fn options(
             "planning_timeout" => options.planning_timeout = seconds(&key, &value)?,
             "path_timeout" => options.path_timeout = seconds(&key, &value)?,
             "seed" => options.seed = value.extract()?,
+            "end_gap" => options.end_gap = value.extract()?,
             "clearance" => options.clearance = value.extract()?,
             "max_simulations" => options.max_simulations = value.extract()?,
             "threads" => options.threads = value.extract()?,
@@ -178,6 +179,7 @@ pub(crate) fn options(
             "targets" => options.targets = Some(parts(data, &value)?),
             "base" => options.base = parts(data, &value)?,
             "keep" => options.keep = parts(data, &value)?,
+            "keep_out" => options.keep_out = parts(data, &value)?,
             "moved" => options.moved = poses(data, &value)?,
             "assembly" => together = value.extract()?,
             "staging" => staging = Some(value),
@@ -211,7 +213,12 @@ pub(crate) fn options(
     options.fixed.sort_unstable();
     options.fixed.dedup();
     if let Some((files, _)) = data.files() {
-        for (list, described) in [(&mut options.base, &files.base), (&mut options.keep, &files.keep)] {
+        let described = [
+            (&mut options.base, &files.base),
+            (&mut options.keep, &files.keep),
+            (&mut options.keep_out, &files.keep_out),
+        ];
+        for (list, described) in described {
             if list.is_empty() {
                 *list = described.iter().map(|name| data.part(py, name)).collect::<PyResult<_>>()?;
                 list.sort_unstable();

@@ -217,7 +217,10 @@ pub struct PlanOptions {
     pub seed: u64,
     /// The gap between a part's hull and that of the rest where its path out ends, in the input's units, at least 0;
     /// `None` for a hundredth of the longest side of the part's box.
-    pub clearance: Option<f64>,
+    pub end_gap: Option<f64>,
+    /// The distance that parts keep from what they pass on their way, in the input's units, at least 0. Pairs that are nearer
+    /// as they stand keep what they have; those that touch as they stand may touch.
+    pub clearance: f64,
     /// The direction up, in the input's frame, of any length but 0: upward paths come before sideways ones, and these
     /// before downward ones. `None` for the direction in which most parts can go at first.
     pub up: Option<[f64; 3]>,
@@ -236,6 +239,9 @@ pub struct PlanOptions {
     /// Parts that stay unless others that are asked for cannot leave otherwise. They are not asked for: the plan is
     /// complete with them in the assembly.
     pub keep: Vec<u32>,
+    /// Parts that are in the way and do not come apart, as a fixture or a table: they may not move, and are no base.
+    /// In the plan they are among those that may not move.
+    pub keep_out: Vec<u32>,
     /// Groups that should leave as wholes, to be taken apart afterwards. A part may be in several groups if these are
     /// nested.
     pub groups: Vec<Vec<u32>>,
@@ -276,6 +282,7 @@ impl PlanOptions {
             threads: self.threads,
             deadline_ns: self.timeout.map(clock::deadline_in),
             seed: self.seed,
+            end_gap: self.end_gap,
             clearance: self.clearance,
             up: self.up,
             max_simulations: self.max_simulations,
@@ -286,6 +293,7 @@ impl PlanOptions {
             targets: self.targets.clone(),
             base: self.base.clone(),
             keep: self.keep.clone(),
+            keep_out: self.keep_out.clone(),
             groups: self.groups.clone(),
             moved: self.moved.iter().map(moved_part).collect(),
             reports: self.reports,

@@ -61,6 +61,7 @@ impl Session {
         self.options.fixed.retain(|p| !is_out(p));
         self.options.base.retain(|p| !is_out(p));
         self.options.keep.retain(|p| !is_out(p));
+        self.options.keep_out.retain(|p| !is_out(p));
         if let Some(targets) = &mut self.options.targets {
             targets.retain(|p| !is_out(p));
         }

@@ -63,6 +63,7 @@ pub(crate) fn all() -> Vec<Message> {
                 ("targets", "u32", Field("targets")),
                 ("base", "u32", Field("base")),
                 ("keep", "u32", Field("keep")),
+                ("keep_out", "u32", Field("keep_out")),
                 ("sizes of groups", "u32", Field("groups")),
                 ("parts of groups", "u32", SumBefore),
                 ("moved", "MovedPart", Field("moved")),

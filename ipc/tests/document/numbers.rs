@@ -74,7 +74,7 @@ fn groups() -> Vec<Group> {
                 plan::PLAN_ASSEMBLY,
                 plan::PLAN_NO_STAGING,
                 plan::PLAN_TRACE,
-                plan::PLAN_HAS_CLEARANCE,
+                plan::PLAN_HAS_END_GAP,
                 plan::PLAN_HAS_UP,
                 plan::PLAN_REPORT_STABILITY,
                 plan::PLAN_REPORT_CLEARANCE,

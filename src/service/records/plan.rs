@@ -99,7 +99,8 @@ impl PlanQuestion<'_> {
         digest.text(request.planner.name()).text(request.engine.name()).text(request.actions.name());
         digest.text(request.static_analysis.name()).text(&format!("{:?}", request.penalty));
         digest.integer(u64::from(request.sweeps())).integer(request.seed);
-        digest.text(&format!("{:?} {:?}", request.max_simulations, request.clearance));
+        digest.text(&format!("{:?} {:?}", request.max_simulations, request.end_gap));
+        digest.numbers([request.clearance]);
         digest.text(&format!("{:?} {:?}", request.up, PreferredGroups::new(&request.groups)));
         let mut targets = request.targets.clone();
         if let Some(targets) = &mut targets {
@@ -107,7 +108,10 @@ impl PlanQuestion<'_> {
             targets.dedup();
         }
         digest.integer(u64::from(targets.is_some()));
-        for list in [fixed, removed, base, keep, &targets.unwrap_or_default()] {
+        let mut keep_out = request.keep_out.clone();
+        keep_out.sort_unstable();
+        keep_out.dedup();
+        for list in [fixed, removed, base, keep, &keep_out, &targets.unwrap_or_default()] {
             digest.integer(list.len() as u64);
             list.iter().for_each(|&part| {
                 digest.integer(part as u64);

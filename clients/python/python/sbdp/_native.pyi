@@ -29,7 +29,10 @@ class Options(TypedDict, total=False):
     planning_timeout: float | None
     path_timeout: float | None
     seed: int
-    clearance: float | None
+    end_gap: float | None
+    """Distance between the hulls of a part and of the rest where its path ends."""
+    clearance: float
+    """Distance that parts keep from what they pass on their way, unless they are nearer as they stand."""
     max_simulations: int | None
     threads: int
     fixed: str | Iterable[str]
@@ -42,6 +45,8 @@ class Options(TypedDict, total=False):
     """Parts that stay as long as others leave."""
     keep: str | Iterable[str]
     """Parts that stay unless others that are asked for cannot leave otherwise."""
+    keep_out: str | Iterable[str]
+    """Parts that are in the way and do not come apart, as a fixture or a table: they may not move, and are no base."""
     moved: Mapping[str, Pose]
     """Parts that stand elsewhere: the rigid motion of their mesh from where the assembly has it."""
     assembly: bool
