@@ -574,6 +574,10 @@ pub(crate) const APPROACH_PRECISION: f64 = 0.01;
 /// times the rounding of binary STL files, whose coordinates are 10 times as large as the part. At half, touching parts of
 /// such files have a clearance; at double, so have fewer fits.
 pub(crate) const ASSEMBLED_CONTACT: f64 = 1e-5;
+/// Share of their distance as they stand that parts keep on their way where more is wanted than they have. The facets of a shaft
+/// and of its hole pass each other on the way, and are nearer then than they were: by a few hundredths of the play in most
+/// files, by up to a third in a coarse hole. At half, a shaft may come near its hole; at double, no coarse shaft leaves.
+pub(crate) const FIT_SHARE: f64 = 0.5;
 /// Share of a shift of waypoints that arrives at a place between them. Where less arrives, as near the start, which stays, the
 /// path gets a waypoint. At half, a path is bent ten times as far as it needs to be; at double, it gets waypoints where a
 /// bend three times as far would do.

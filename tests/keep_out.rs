@@ -82,9 +82,12 @@ fn what_is_in_the_way_is_no_base_and_no_part_that_is_left() {
     assert_eq!(plan["initial"]["stability"]["unstable"], json!([]), "{plan}");
     let (code, other) = planned(folder.path(), Some(&daemon.runtime_dir()), &options);
     assert_eq!((code, &other["steps"], &other["base"]), (Some(0), &plan["steps"], &plan["base"]));
-    // Asked for, it comes off the table.
-    let (_, target) = planned(folder.path(), None, &["--keep-out", "table", "--target", "a"]);
-    assert_eq!(target["remaining"], json!(["table"]), "{target}");
+    // Alone it may stay on the table, unless it is asked for.
+    let alone = ["--keep-out", "table", "--removed", "b"];
+    let (code, stays) = planned(folder.path(), None, &alone);
+    assert_eq!((code, &stays["steps"]), (Some(0), &json!([])), "{stays}");
+    let (code, leaves) = planned(folder.path(), None, &[&alone[..], &["--target", "a"]].concat());
+    assert_eq!((code, &leaves["remaining"]), (Some(0), &json!(["table"])), "{leaves}");
     // The description of the assembly may say it.
     fs::write(parts.join("assembly.json"), r#"{"keep_out": ["table"]}"#).unwrap();
     assert_eq!(planned(folder.path(), None, &[]).1["base"], json!(["a"]));

@@ -187,26 +187,32 @@ fn a_plan_ends_where_it_needs_more_hands() {
     assert_eq!(backwards, order(&steady));
 }
 
-/// Upside down, the pin falls on the slider; while one hand moves the slider aside, another one has to hold the pin.
+/// Upside down, a slider lies on the roof of its channel, and a pin on the slider. While one hand moves the slider aside,
+/// another one has to hold the pin.
 #[test]
 fn hands_are_counted_while_parts_are_moved_aside() {
     let folder = tempfile::tempdir().unwrap();
-    let assembly = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/assemblies/covered-pin");
+    let parts = folder.path().join("parts");
+    fs::create_dir(&parts).unwrap();
+    let housing = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/assemblies/covered-pin/housing.obj");
+    fs::copy(housing, parts.join("housing.obj")).unwrap();
+    fs::write(parts.join("slider.obj"), cuboid([10.5, 10.5, 10.5], [30.0, 29.5, 20.0])).unwrap();
+    fs::write(parts.join("pin.obj"), cuboid([15.0, 16.0, 5.5], [23.0, 24.0, 10.5])).unwrap();
     let planned = |hands: &str| {
         let plan = [
             "plan",
-            assembly,
+            "parts",
             "--embedded",
             "-q",
             "--up=-z",
+            "--fixed",
+            "housing",
             "--target",
             "pin",
-            "--hands",
-            hands,
             "--json",
             "-",
         ];
-        let found = sbdp(folder.path(), &plan);
+        let found = sbdp(folder.path(), &[&plan[..], &["--hands", hands]].concat());
         (found.status.code(), serde_json::from_slice::<Value>(&found.stdout).unwrap())
     };
     let (code, plan) = planned("2");
@@ -217,8 +223,8 @@ fn hands_are_counted_while_parts_are_moved_aside() {
         (Some(3), &"exhausted".into(), &serde_json::json!([]))
     );
     let reason = plan["reason"].as_str().unwrap();
-    assert!(reason.contains("slider: 1 for that, and 1 to hold pin"), "{reason}");
-    assert_eq!(plan["remaining"], serde_json::json!(["housing", "slider", "pin"]));
+    assert!(reason.contains("moves slider: 1 for that, and 1 to hold pin"), "{reason}");
+    assert_eq!(plan["remaining"], serde_json::json!(["housing", "pin", "slider"]));
 }
 
 #[test]

@@ -74,7 +74,7 @@ pub const CONTROL_CANCEL: u32 = 1;
 /// The header of every request.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("sbdp/v10/RequestHeader")]
+#[type_name("sbdp/v11/RequestHeader")]
 pub struct RequestHeader {
     /// A [`RequestKind`].
     pub kind: u32,
@@ -92,7 +92,7 @@ pub struct RequestHeader {
 /// The header of every response.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("sbdp/v10/ResponseHeader")]
+#[type_name("sbdp/v11/ResponseHeader")]
 pub struct ResponseHeader {
     /// A [`ResponseKind`].
     pub kind: u32,

@@ -8,15 +8,15 @@ use std::path::{Path, PathBuf};
 use iceoryx2::prelude::{Config, FileName, Path as IoxPath, SemanticString};
 
 /// Request-response: plans, credits, status.
-pub const PLAN_SERVICE: &str = "sbdp/v10/plan";
+pub const PLAN_SERVICE: &str = "sbdp/v11/plan";
 /// Request-response: meshes in, handle out.
-pub const GEOMETRY_SERVICE: &str = "sbdp/v10/geometry";
+pub const GEOMETRY_SERVICE: &str = "sbdp/v11/geometry";
 /// Publish-subscribe: progress.
-pub const PROGRESS_SERVICE: &str = "sbdp/v10/progress";
+pub const PROGRESS_SERVICE: &str = "sbdp/v11/progress";
 /// Event: wakes the daemon.
-pub const WAKE_SERVER_SERVICE: &str = "sbdp/v10/wake/server";
+pub const WAKE_SERVER_SERVICE: &str = "sbdp/v11/wake/server";
 /// Event: wakes one client.
-pub const WAKE_CLIENT_SERVICE: &str = "sbdp/v10/wake/client";
+pub const WAKE_CLIENT_SERVICE: &str = "sbdp/v11/wake/client";
 
 /// The most clients at a time.
 pub const MAX_CLIENTS: usize = 40;

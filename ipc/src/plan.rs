@@ -319,7 +319,7 @@ pub struct PlanRequest {
     /// it to the daemon.
     pub end_gap: Option<f64>,
     /// The distance that parts keep from what they pass on their way, in the input's units, at least 0. Pairs that are nearer as
-    /// they stand keep what they have.
+    /// they stand keep half of what they have.
     pub clearance: f64,
     /// The direction up, in the input's frame, of any length but 0; `None` leaves it to the daemon.
     pub up: Option<[f64; 3]>,

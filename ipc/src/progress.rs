@@ -17,7 +17,7 @@ pub const TRIED_TURNS: u32 = 1 << 31;
 /// One sample on `progress`, received by every client; each picks its own.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("sbdp/v10/Progress")]
+#[type_name("sbdp/v11/Progress")]
 pub struct ProgressSample {
     /// Id of the client port that asked, low half first.
     pub client: [u64; 2],

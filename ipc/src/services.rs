@@ -73,7 +73,7 @@ fn name(service: &'static str) -> Result<ServiceName, SetupError> {
     ServiceName::new(service).map_err(SetupError::at(service))
 }
 
-/// `sbdp/v10/plan`.
+/// `sbdp/v11/plan`.
 ///
 /// # Errors
 /// Never in practice: the name is valid.
@@ -85,7 +85,7 @@ pub fn plan(node: &Node<Transport>) -> Result<ExchangeBuilder, SetupError> {
         .max_borrowed_responses_per_pending_response(layout::BORROWED_RESPONSES))
 }
 
-/// `sbdp/v10/geometry`.
+/// `sbdp/v11/geometry`.
 ///
 /// # Errors
 /// Never in practice: the name is valid.
@@ -117,7 +117,7 @@ fn exchange(node: &Node<Transport>, service: &'static str) -> Result<ExchangeBui
         .enable_fire_and_forget_requests(false))
 }
 
-/// `sbdp/v10/progress`.
+/// `sbdp/v11/progress`.
 ///
 /// # Errors
 /// Never in practice: the name is valid.

@@ -98,12 +98,12 @@ fn numbers_of_kinds_and_codes_and_names_of_services() {
     assert_eq!((ErrorCode::Busy as u32, ErrorCode::Cancelled as u32), (3, 12));
     assert_eq!(
         (PROTOCOL, layout::PLAN_SERVICE, layout::GEOMETRY_SERVICE),
-        (10, "sbdp/v10/plan", "sbdp/v10/geometry")
+        (11, "sbdp/v11/plan", "sbdp/v11/geometry")
     );
-    assert_eq!(layout::PROGRESS_SERVICE, "sbdp/v10/progress");
+    assert_eq!(layout::PROGRESS_SERVICE, "sbdp/v11/progress");
     assert_eq!(
         (layout::WAKE_SERVER_SERVICE, layout::WAKE_CLIENT_SERVICE),
-        ("sbdp/v10/wake/server", "sbdp/v10/wake/client")
+        ("sbdp/v11/wake/server", "sbdp/v11/wake/client")
     );
 }
 

@@ -155,7 +155,7 @@ pub(super) struct PlanArguments {
     #[arg(long, value_name = "LENGTH", allow_negative_numbers = true, help_heading = WHAT)]
     pub(super) end_gap: Option<f64>,
     /// Distance that parts keep from what they pass on their way, in the input's units. Pairs that are nearer as they stand
-    /// keep what they have, and those that touch as they stand may touch
+    /// keep half of what they have, and those that touch as they stand may touch
     #[arg(long, value_name = "LENGTH", default_value_t = 0.0, hide_default_value = true, allow_negative_numbers = true, help_heading = WHAT)]
     pub(super) clearance: f64,
     /// The direction up, as +z or as a vector: upward paths come before sideways ones, and these before downward ones

@@ -5,10 +5,11 @@ use nalgebra::Point3;
 use crate::geometry::{Pose, Shape};
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination};
-use crate::tolerances::{APPROACH_PRECISION, ASSEMBLED_CONTACT};
+use crate::tolerances::{APPROACH_PRECISION, ASSEMBLED_CONTACT, SCREW_TURN};
 
 use super::closest_approach::{ClosestApproach, PassedPair, closest_approach};
 use super::course::turns_far;
+use super::helix_profile::turn_along_helix;
 
 /// A moving and a standing part.
 #[derive(Debug, Clone)]
@@ -75,9 +76,10 @@ impl<'a> PassingPair<'a> {
         Ok((assembled >= self.contact()).then_some(assembled))
     }
 
-    /// Whether the way turns far, as off a thread.
-    pub(crate) fn turns_far(&self) -> bool {
-        turns_far(&self.passed.path)
+    /// Whether the way begins along a helix and turns far there, within a play of it: off a thread.
+    pub(crate) fn follows_thread(&self, play: f64) -> bool {
+        let PassedPair { shapes: [moving, _], path, centre } = &self.passed;
+        turns_far(path) && turn_along_helix(path, centre, moving.reach, play) > SCREW_TURN
     }
 
     /// Where the two come nearer than the distance that they keep, or where that is not certain.

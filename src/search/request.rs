@@ -153,7 +153,7 @@ pub struct PlanRequest {
     /// `None` for a hundredth of the longest side of the part's box.
     pub end_gap: Option<f64>,
     /// The distance that parts keep from what they pass on their way, in the input's units, at least 0. Pairs that are nearer
-    /// as they stand keep what they have; those that touch as they stand may touch.
+    /// as they stand keep half of what they have; those that touch as they stand may touch.
     pub clearance: f64,
     /// The direction up, in the input's frame, of any length but 0: upward paths come before sideways ones, and these
     /// before downward ones. `None` for the direction in which most parts can go at first.

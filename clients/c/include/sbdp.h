@@ -1180,7 +1180,7 @@ typedef struct SbdpPlanOptions {
     /**
      * The gap with which a path out ends, in the input's units; null for a hundredth of the part's longest side.
      */
-    const double *clearance;
+    const double *end_gap;
     /**
      * The direction up, three numbers, of any length but 0; null for the one in which most parts can go at first.
      */
@@ -1283,6 +1283,19 @@ typedef struct SbdpPlanOptions {
      * without that for +z.
      */
     const double *against_gravity;
+    /**
+     * Parts that are in the way and do not come apart, as a fixture or a table: they may not move, and are no base.
+     */
+    const uint32_t *keep_out;
+    /**
+     * How many.
+     */
+    size_t keep_out_count;
+    /**
+     * The distance that parts keep from what they pass on their way, in the input's units, at least 0. Pairs that are nearer as
+     * they stand keep half of what they have; those that touch as they stand may touch.
+     */
+    double clearance;
 } SbdpPlanOptions;
 
 /**

@@ -232,7 +232,7 @@ pub struct SbdpPlanOptions {
     /// How many.
     pub keep_out_count: usize,
     /// The distance that parts keep from what they pass on their way, in the input's units, at least 0. Pairs that are nearer as
-    /// they stand keep what they have; those that touch as they stand may touch.
+    /// they stand keep half of what they have; those that touch as they stand may touch.
     pub clearance: f64,
 }
 

@@ -26,7 +26,7 @@ use nalgebra::Point3;
 use crate::geometry::{Bounds, Pose, Surface};
 use crate::termination::{Interrupt, Termination};
 
-pub(crate) use thread_path::path_on_thread;
+pub(crate) use thread_path::{path_on_thread, turn_along_helix};
 pub(crate) use unscrewing::{ScrewWay, ways_off};
 
 use super::course::{Course, Interval};

@@ -120,10 +120,20 @@ impl ScrewPath {
         mean
     }
 
+    /// The angle up to which all places are as near to the helix as `near`.
+    pub(super) fn angle_within(&self, near: f64) -> f64 {
+        let followed = self.knots.iter().take_while(|k| self.off(k) <= near);
+        followed.last().map_or(0.0, |k| k.angles[1])
+    }
+
+    /// How far a piece of the path is from the helix.
+    fn off(&self, knot: &Knot) -> f64 {
+        (knot.unscrewed * self.centre - self.reference * self.centre).norm()
+    }
+
     /// The last place as near to the helix as `near`: the angle, and the place on the path.
     pub(super) fn leaves(&self, near: f64) -> Option<(f64, f64)> {
-        let off = |k: &&Knot| (k.unscrewed * self.centre - self.reference * self.centre).norm() <= near;
-        self.knots.iter().rev().find(off).map(|k| (k.angles[1], k.way[1]))
+        self.knots.iter().rev().find(|k| self.off(k) <= near).map(|k| (k.angles[1], k.way[1]))
     }
 
     /// The data of a stretch; `None` if the two parts are nowhere near each other.

@@ -9,6 +9,8 @@
 //! ([`shared_thread`](super::shared_thread)): in the middle of the play, and no motion but turning along the helix. It
 //! is a proposal, verified like any path.
 
+use nalgebra::Point3;
+
 use crate::budgets::CENTRING_PIECES;
 use crate::geometry::{Pose, interpolate};
 use crate::scene::Scene;
@@ -45,6 +47,15 @@ pub(crate) fn path_on_thread(
     let Some(start) = path.first() else { return Ok(None) };
     let thread = SharedThread::widest(scene, standing, part, start, &followed.helix, termination)?;
     Ok(thread.and_then(|thread| along(&thread, (left, way), path, &course)))
+}
+
+/// The angle (radians) by which a path turns along a helix that rises, from its start on, no further than a play from it. `centre`
+/// and `reach` are those of the moving shape.
+pub(crate) fn turn_along_helix(path: &[Pose], centre: &Point3<f64>, reach: f64, play: f64) -> f64 {
+    let course = Course::new(path, *centre, reach);
+    let followed = ScrewPath::new(&course, &[Interval::WHOLE], play);
+    let followed = followed.filter(|followed| followed.helix.rise != 0.0);
+    followed.map_or(0.0, |followed| followed.angle_within(play).abs())
 }
 
 /// The path that turns along a thread up to where the given one leaves it (angle, and place on the path), and from
