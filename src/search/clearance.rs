@@ -56,9 +56,12 @@ impl Leaving<'_, '_> {
     }
 }
 
-/// By moving and standing part: the clearance that was wanted, and how far the two are to be apart.
+/// The clearance that was wanted of a pair, and how far the two are to be apart.
+type KeptDistance = (f64, Option<f64>);
+
+/// By moving and standing part.
 #[derive(Default)]
-struct KeptDistances(Mutex<HashMap<[usize; 2], (f64, Option<f64>)>>);
+struct KeptDistances(Mutex<HashMap<[usize; 2], KeptDistance>>);
 
 impl Problem<'_> {
     /// How far a pair is to be apart on its way: where it has less as it stands, a share of that. `None` if it may touch: as it
